@@ -191,10 +191,8 @@ def compare_orders(
     )
     tests = tuple(compare_nested(small.regression, large.regression) for small, large in pairwise(fits))
 
-    def better(
-        own: FrequencyFit,
-    ) -> bool:  # some higher order, at the level shared among them: a law may lack the next power
-        higher = fits[own.order :]
+    def better(own: FrequencyFit) -> bool:
+        higher = fits[own.order :]  # one of them, at the level shared among all: a law may lack the next power
         return any(compare_nested(own.regression, one.regression).p_value < level / len(higher) for one in higher)
 
     return OrderComparison(fits, tests, level, next(one.order for one in fits if not better(one)))

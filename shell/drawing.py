@@ -1,6 +1,6 @@
 """Drawing by pyvista: the part of `shell.render` that runs in the child process."""
 
-import pickle
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,14 @@ def draw_job(folder: str) -> None:
     """Draw a job; runs in the child process."""
     import pyvista as pv
 
-    scenes: list[Scene]
-    scenes, view, window, swings = pickle.loads(Path(folder, "job").read_bytes())
+    with np.load(Path(folder, "job.npz")) as job:
+        scenes = [
+            Scene(
+                *(value.item() if (value := job[f"{field.name}_{k}"]).ndim == 0 else value for field in fields(Scene))
+            )
+            for k in range(int(job["count"]))
+        ]
+        view, swings, window = str(job["view"]), job["swings"].tolist(), job["window"].tolist()
     plotter = pv.Plotter(
         off_screen=True, shape=(1, len(scenes)), window_size=[window[0] * len(scenes), window[1]], border=False
     )
@@ -74,7 +80,8 @@ def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], first: bool) 
         show_scalar_bar=bool(scene.legend), scalar_bar_args=bar, ambient=0.38, diffuse=0.72, specular=0.1,
     )  # fmt: skip
     moving = [(body, body.points.copy(), scene.displacement[origin])]
-    for members in scene.nodes:
+    for line in scene.nodes:
+        members = line[line >= 0]
         if len(members) > 1:
             curve = pv.lines_from_points(scene.points[members])
             plotter.add_mesh(curve, color=NODE, line_width=3.0, render_lines_as_tubes=True)

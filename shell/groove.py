@@ -33,11 +33,8 @@ LARGEST = 8.0  # elements over the wall
 GROWTH = 3.0  # of elements away from the cut's edges
 FIRST = 0.3  # first element over the smallest half-dimension of the cut
 SHALLOW = 0.01  # depth over the wall, below which E, then small, needs no finer ones
-RELIEF_ERROR = (
-    0.03  # standard error of E: 1 % off a face, up to 3.3 % too little off an edge (tests/reference/grooves.csv)
-)
-
-
+RELIEF_ERROR = 0.03
+"""Standard error of E: 1 % off a face, up to 3.3 % too little off an edge (tests/reference/grooves.csv)."""
 NORMAL = [2, 4, 5]  # stresses on a face
 
 
@@ -119,9 +116,8 @@ def _lay_grid(resonator: Resonator, groove: Groove, n: int) -> _Grid:
     if not groove.width < np.pi * r / n:
         raise ShellError(f"a cut of {mm(groove.width)} is wider than half a wave of n = {n}.")
     far, side, coarse = REACH[groove.face] * h, groove.width / 2, LARGEST * h
-    fine = FIRST * min(
-        max(groove.depth, SHALLOW * h), (two - one) / (1 if at_rim else 2), side, h - groove.depth if deep < 2 else h
-    )
+    over, left = max(groove.depth, SHALLOW * h), h - groove.depth if deep < 2 else h
+    fine = FIRST * min(over, (two - one) / (1 if at_rim else 2), side, left)
     start = max(one - far, 1e-3 * end)
     s = _beside(one, _graded(one - start, fine, 0, coarse), _graded(two - one, fine, not at_rim))
     last = min(end, two + far)
@@ -257,16 +253,16 @@ def _loads(
 
     eta, theta = points(grid.eta, k), points(grid.theta, j)
     heights, back = np.unique(eta, return_inverse=True)
-    surface = [] if face == "edge" else [pair.resonator.height_of(face)]
+    if face != "edge":
+        heights = np.append(heights, pair.resonator.height_of(face))  # the free face, last
     layers = np.zeros(2)
     for row in np.unique(i):
         for station, s in enumerate(points(grid.s, np.array([row]))[0]):
-            at_height = np.append(heights, surface)
-            here = cut(pair.resonator, pair.solution.system, min(s / pair.resonator.length, 1.0), at_height)
+            here = cut(pair.resonator, pair.solution.system, min(s / pair.resonator.length, 1.0), heights)
             e, d = here.strains(pair.solution.unknowns), here.displacements(pair.solution.unknowns)
             stress = G * np.array([2, 2, 2, 1, 1, 1])[:, None] * e
             stress[:3] += lam * e[:3].sum(axis=0)
-            if surface:
+            if face != "edge":
                 stress[NORMAL] -= stress[NORMAL, -1:]
             place = pair.resonator.at([s])
             t, normal = (place.tangent_r[0], place.tangent_z[0]), (place.normal_r[0], place.normal_z[0])

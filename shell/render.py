@@ -2,13 +2,13 @@
 
 import io
 import os
-import pickle
 import shutil
 import subprocess
 import sys
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 from math import pi
 from pathlib import Path
 from typing import Any, Literal
@@ -57,7 +57,8 @@ def can_draw() -> tuple[bool, str]:
     """Tell whether this machine can draw, and the remedy when it cannot."""
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
-    scene = Scene(corners, 0 * corners, faces, np.arange(4.0), "", "", [], np.zeros(0, dtype=np.int64), False)
+    none = np.zeros(0, dtype=np.int64)
+    scene = Scene(corners, 0 * corners, faces, np.arange(4.0), "", "", none.reshape(0, 0), none, False)
     try:
         render_png(scene, width=64, height=64)
     except NoOpenGL as error:
@@ -74,7 +75,10 @@ def _draw(
     if view not in VIEWS:
         raise ShellError(f"a view is one of {', '.join(VIEWS)}, not {view!r}.")
     with tempfile.TemporaryDirectory() as folder:
-        Path(folder, "job").write_bytes(pickle.dumps((together, view, window, swings)))
+        job: dict[str, Any] = {"view": view, "window": window, "swings": swings, "count": len(together)}
+        for k, scene in enumerate(together):
+            job |= {f"{field.name}_{k}": getattr(scene, field.name) for field in fields(Scene)}
+        np.savez(Path(folder, "job.npz"), **job)
         done = threading.Event()
         threading.Thread(target=_watch, args=(folder, len(swings), progress, done), daemon=True).start()
         try:

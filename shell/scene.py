@@ -23,7 +23,7 @@ class Scene:
     values: Array  # (N,) array, what the colour shows
     legend: str  # quantity and unit of the values
     title: str  # a line above the resonator; a second line stands below it as a remark
-    nodes: list[NDArray[np.int64]]  # vertex numbers along each nodal line
+    nodes: NDArray[np.int64]  # (L, k) array, vertex numbers along each nodal line, -1 after its end
     antinodes: NDArray[np.int64]  # (A,) array, vertex numbers
     opens_up: bool  # whether the open end is at the larger z, from where it is then seen
     # (A, 2, 3) array, m, lines across the rim: axes of the slower mode of a split pair, then as many of the faster
@@ -46,10 +46,14 @@ class Scene:
 
 def compose_scene(surface: Surface, values: Array, legend: str, title: str = "", axes: Array | None = None) -> Scene:
     """Compose a picture of a mode: nodal meridians and antinodes marked, the displacement exaggerated to a visible size."""
+    lines = surface.nodes
+    nodes = np.full((len(lines), max(map(len, lines), default=0)), -1, dtype=np.int64)
+    for k, line in enumerate(lines):
+        nodes[k, : len(line)] = line
     rim = surface.position > 0.98
     opens_up = bool(surface.points[rim, 2].mean() > surface.points[:, 2].mean()) if rim.any() else False
     swing = surface.displacement * EXAGGERATION * surface.size
     return Scene(
-        surface.points, swing, surface.triangles, np.asarray(values, dtype=float), legend, title, surface.nodes,
+        surface.points, swing, surface.triangles, np.asarray(values, dtype=float), legend, title, nodes,
         surface.antinodes, opens_up, np.zeros((0, 2, 3)) if axes is None else axes,
     )  # fmt: skip

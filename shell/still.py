@@ -37,7 +37,7 @@ def draw_still(scene: Scene, view: str = "oblique", width: int = 900, height: in
     colour = colormaps["cividis"](norm(scene.values))[triangles, :3]
     colour *= 0.42 + 0.58 * np.abs(normal @ LIGHT)[:, None, None]
     ghost = (scene.points @ seen)[triangles] - [0.0, 0.0, 9.0 * size]
-    marks = [(_ribbon(bent[line], THICK * size), NODE) for line in scene.nodes]
+    marks = [(_ribbon(bent[line[line >= 0]], THICK * size), NODE) for line in scene.nodes]
     marks += [(_dot(bent[k], DOT * size), ANTINODE) for k in scene.antinodes]
     names = np.repeat([SLOW, FAST], len(scene.axes) // 2)
     ends = scene.axes @ seen

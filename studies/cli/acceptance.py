@@ -159,8 +159,6 @@ def _drift(found: Acceptance) -> list[Figure | Sentence]:
             style.draw_allan(axes, allan, style.BLUE, label, noise)
             return made
 
-    caption, label = (
-        "Allan deviation of the longest drift record.",
-        "overlapping Allan deviation, 90 % interval; dashed: N, B, K",
-    )
+    label = "overlapping Allan deviation, 90 % interval; dashed: N, B, K"
+    caption = "Allan deviation of the longest drift record."
     return [Figure(draw, caption, "Allan deviation over averaging time, both logarithmic."), Sentence(words)]

@@ -3,18 +3,19 @@
 from collections.abc import Callable, Sequence
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
 from cyclopts import Parameter
 
-from compensation.arrays import Array
 from shell.constants import zero_Celsius
-from shell.elastic import Elastic
-from shell.resonator import Resonator
 from studies.errors import InputError, naming
 from studies.files.given import refuse_unsound
-from studies.instrument.card import Instrument, load_card
+
+if TYPE_CHECKING:
+    from compensation.arrays import Array
+    from shell.elastic import Elastic
+    from shell.resonator import Resonator
+    from studies.instrument.card import Instrument
 
 
 def numbers(good: Callable[[Any], bool], words: str, **more: Any) -> Parameter:
@@ -65,20 +66,24 @@ Folder = Annotated[str, Parameter(help="Folder of the study (hrg study run --out
 MOST_TEMPERATURES = 10_000
 
 
-def open_card(card: str, temperature: float | None) -> tuple[Instrument, float]:
+def open_card(card: str, temperature: float | None) -> "tuple[Instrument, float]":
     """Return the instrument of a card, and the temperature (K) of --temperature or the card's own."""
+    from studies.instrument.card import load_card
+
     instrument = load_card(card)
     return instrument, instrument.reference_temperature if temperature is None else temperature + zero_Celsius
 
 
-def open_given(card: str | None, save: str | None = None) -> Instrument | None:
+def open_given(card: str | None, save: str | None = None) -> "Instrument | None":
     """Return the instrument of --card where it is given; --save writes that card with what was found."""
+    from studies.instrument.card import load_card
+
     if save is not None and card is None:
         raise InputError("--save writes a card with the values found; name the card to start from by --card.")
     return load_card(card) if card else None
 
 
-def open_resonator(card: str, temperature: float | None) -> tuple[Instrument, float, Resonator, Elastic]:
+def open_resonator(card: str, temperature: float | None) -> "tuple[Instrument, float, Resonator, Elastic]":
     """Return the same, and the resonator and the elastic constants at that temperature."""
     instrument, T = open_card(card, temperature)
     with naming(instrument.path):
@@ -95,8 +100,10 @@ def ending_of(out: str, kinds: Sequence[str]) -> str:
     return kind
 
 
-def lay_temperatures(from_degC: float, to_degC: float, step: float) -> Array:
+def lay_temperatures(from_degC: float, to_degC: float, step: float) -> "Array":
     """Return the temperatures (K) of --from, --to and --step, --to among them."""
+    import numpy as np
+
     asked = f"--from {from_degC:g} --to {to_degC:g} --step {step:g}"
     if not step > 0 or not to_degC >= from_degC:
         raise InputError(f"{asked}: the step must be positive and --to not below --from.")

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 
 from compensation.ringdown.answer import Estimate
-from compensation.wave_fit import WaveFit
+from compensation.wave_fit import MISALIGNED, WaveFit
 from compensation.wave_fit import fit_whole_angle as fit
 from studies.cli.arguments import FRACTION, Confidence, Run, open_given
 from studies.cli.output import answers, keep_card, say
@@ -218,7 +218,7 @@ def _fit_record(
             drive_skew=1e-3 * loop.drive_skew_mrad,
             pickoff_gain_ratio=loop.pickoff_gain_ratio,
             pickoff_skew=1e-3 * loop.pickoff_skew_mrad,
-            misalignment=(1e-3 * loop.misalignment_mrad, 1e-3 * stated.get("loop.misalignment_mrad", 0.5)),
+            misalignment=(1e-3 * loop.misalignment_mrad, 1e-3 * stated.get("loop.misalignment_mrad", 1e3 * MISALIGNED)),
             stiff=loop.quadrature_control == "stiffness",
             late=late,
             confidence=confidence,

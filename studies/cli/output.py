@@ -19,12 +19,12 @@ from studies.errors import InputError
 from studies.files.given import printable
 from studies.files.paths import guarded
 from studies.files.writing import write_text
-from studies.instrument.card import SCHEMA, Instrument, load_card, save_card
 from studies.progress import Stages
 from studies.results import Result, Sentence
 from studies.results.terminal import print_result
 
 if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
     from studies.models import Model
     from studies.record import Record
 
@@ -101,6 +101,8 @@ def check_ending(option: str, path: str, what: str, *endings: str) -> None:
 
 def _caveats_of(paths: Iterable[Path]) -> list[str]:
     """Return the caveats of the materials of all cards among some files, each once."""
+    from studies.instrument.card import SCHEMA, load_card
+
     found: dict[str, None] = {}
     for path in paths:
         if path.suffix != ".toml":
@@ -112,13 +114,15 @@ def _caveats_of(paths: Iterable[Path]) -> list[str]:
     return list(found)
 
 
-def keep_card(instrument: Instrument, path: str | None, against: str | None = "", kind: str = "card") -> str | None:
+def keep_card(instrument: "Instrument", path: str | None, against: str | None = "", kind: str = "card") -> str | None:
     """Save a card where a path was given and nothing speaks against it, say so, and return where it is."""
     if path is None:
         return None
     if against:
         say(f"{path} not saved: {against}.")
         return None
+    from studies.instrument.card import save_card
+
     save_card(instrument, path)
     say(f"{kind}: {path}")
     return path

@@ -265,19 +265,12 @@ def weigh(
 
 
 def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
-    """Return the card's values that the data move by more than two of their standard deviations: of many, some do by chance.
-
-    That the card states too small a one has the prior odds of an effect; the data raise them to e^((z² − 1)/2)/|z| times at most.
-    """
+    """Return the card's values that the data move by more than two of their standard deviations: of many, some do by chance."""
     return [
         Cause(
             shift.parameter,
             SHOWN_IN.get(shift.parameter.partition(".")[0], "frequency_Hz"),
-            float(
-                scipy.special.expit(
-                    CONSTANTS["log_prior_effect"] + (shift.shift_sd**2 - 1.0) / 2.0 - np.log(abs(shift.shift_sd))
-                )
-            ),
+            _doubt_of_sd(shift.shift_sd),
             (),
             {shift.parameter: Interval(shift.value, shift.low, shift.high)},
             shift.shift_sd**2,
@@ -286,6 +279,11 @@ def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
         for shift in shifts
         if abs(shift.shift_sd) > FAR
     ]
+
+
+def _doubt_of_sd(z: float) -> float:
+    """Probability that a card states too small a deviation of a value moved by z of it: the prior odds of an effect, times e^((z² − 1)/2)/|z| at most."""
+    return float(scipy.special.expit(CONSTANTS["log_prior_effect"] + (z**2 - 1.0) / 2.0 - np.log(abs(z))))
 
 
 def same_cause(one: Cause, two: Cause) -> bool:

@@ -9,12 +9,13 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from secrets import token_hex
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from studies.errors import InputError
-from studies.files.parquet import Table
 from studies.files.paths import claim
+
+if TYPE_CHECKING:
+    from studies.files.parquet import Table
 
 MANY = 200_000  # rows of a portion
 
@@ -32,7 +33,7 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
         if not target.parent.is_dir():
             raise InputError(f"{path}: cannot be written: there is no folder '{target.parent}'; create it.")
         folder = Path(tempfile.gettempdir()) if special else target.parent
-        with (folder / f".hrg-{token_hex(8)}").open("xb") as file:
+        with (folder / f".hrg-{os.urandom(8).hex()}").open("xb") as file:
             temporary = Path(file.name)
             yield file
             file.flush()
@@ -90,7 +91,7 @@ def write_csv(path: str | Path, head: Iterable[str], rows: Iterable[Iterable[str
     write_text(path, "".join(f"{','.join(row)}\n" for row in (head, *rows)))
 
 
-def write_numbers(path: str | Path, columns: Table, form: str, notes: Iterable[str] = ()) -> None:
+def write_numbers(path: str | Path, columns: "Table", form: str, notes: Iterable[str] = ()) -> None:
     """Write a short table of numbers in one format below lines of comments, whole or not at all."""
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
     lines = [
@@ -101,7 +102,7 @@ def write_numbers(path: str | Path, columns: Table, form: str, notes: Iterable[s
     write_text(path, "\n".join([*lines, ""]))
 
 
-def write_rows(file: IO[bytes], columns: Table) -> Iterator[float]:
+def write_rows(file: IO[bytes], columns: "Table") -> Iterator[float]:
     """Write numbers as lines of cells that read back to the last digit, missing ones empty; yield the part that is done.
 
     Many rows go by pyarrow where it is installed, which writes 5.0 as 5 and is five times as fast.
@@ -113,12 +114,12 @@ def write_rows(file: IO[bytes], columns: Table) -> Iterator[float]:
         yield min(begin + MANY, rows) / rows
 
 
-def _spell(file: IO[bytes], columns: Table) -> None:
+def _spell(file: IO[bytes], columns: "Table") -> None:
     cells = [map(repr, values.tolist()) for values in columns.values()]
     file.write(("\n".join(map(",".join, zip(*cells, strict=True))).replace("nan", "") + "\n").encode())
 
 
-def _spell_fast(file: IO[bytes], columns: Table) -> None:
+def _spell_fast(file: IO[bytes], columns: "Table") -> None:
     arrow, csv = importlib.import_module("pyarrow"), importlib.import_module("pyarrow.csv")
     table = arrow.table({name: arrow.array(values, from_pandas=True) for name, values in columns.items()})
     csv.write_csv(table, file, csv.WriteOptions(include_header=False))

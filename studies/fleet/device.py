@@ -116,14 +116,14 @@ def measure(found: Inferred, reference: float | None) -> dict[str, Measured]:
     sizes = [own / term.spread for own, term in zip(found.numbers.coefficients, found.final.terms, strict=True)]
     coordinates = np.concatenate([u, *sizes])
     card = problem.instrument_at(found.numbers.point)
-    law, slopes, at = problem.law_at(card), priors.slopes(u), priors.at(u)
+    law, at = problem.law_at(card), priors.at(u)
+    slopes = np.pad(priors.slopes(u), ((0, 0), (0, len(C) - count)))  # by the sizes of effects, 0
     each = zip(priors.values, slopes, strict=True)
     rows: dict[str, tuple[float, Array]] = {
         value.name: (at[value.name], row)
         for value, row in each
         if reference is not None or not value.name.startswith(FROM_REFERENCE)
     }
-    none = np.zeros(len(C) - count)
     varied = Variations(card, law, priors.names)
     at_three = (temperature - APART, temperature, temperature + APART)
     settled = {T: _settled(found, varied, card, law, T, slopes) for T in at_three}
@@ -143,7 +143,6 @@ def measure(found: Inferred, reference: float | None) -> dict[str, Measured]:
     rows["slowest time constant (s)"] = _slowest(varied, temperature, slopes)
     out = {}
     for name, (value, J) in rows.items():
-        J = J if len(J) == len(C) else np.append(J, none)
         before, after = float(J @ J), float(J @ C @ J)
         if 0.0 < after < LITTLE**2 * before:  # the prior has its mean where u is 0
             variance = 1.0 / (1.0 / after - 1.0 / before)
@@ -158,19 +157,22 @@ def _settled(
     """Return every response of the settled gyro, as its campaign begins, and its derivatives by the independent coordinates and those of effects."""
     time = np.array([0.0, 60.0, 120.0])
     alone = predict(card, Drive(time, "housing", Profile(time, np.full(3, T))), varied, law)
-    path, signatures = trace(card, alone, 0), found.search.signatures
-    each = list(zip(found.final.terms, found.numbers.coefficients, strict=True))
-    changes = []
-    for term, _ in each:
-        driven = all(getattr(path.states, drive) is not None for drive in term.effect.needs)
-        own = signatures.on_grid(term.effect, term.members, term.starts)(path.states, term.shape, term.response)
-        changes.append(path.changes(term.effect, own, term.response) if driven else {})
-    out = {}
+    path, out = trace(card, alone, 0), dict[str, tuple[float, Array]]()
     for name in RESPONSES:
         slope = np.array([alone.derivatives[v][name][-1] for v in varied.names]) @ slopes
-        ways = [own[name][-1] if name in own else np.zeros(len(c)) for own, (_, c) in zip(changes, each, strict=True)]
-        value = alone.columns[name][-1] + sum(way @ c for way, (_, c) in zip(ways, each, strict=True))
-        out[name] = float(value), np.concatenate([slope, *(w * t.spread for w, (t, _) in zip(ways, each, strict=True))])
+        out[name] = float(alone.columns[name][-1]), slope
+    at = len(varied.names)
+    for term, sizes in zip(found.final.terms, found.numbers.coefficients, strict=True):
+        place, at = slice(at, at + len(sizes)), at + len(sizes)
+        if any(getattr(path.states, drive) is None for drive in term.effect.needs):
+            continue
+        grid = found.search.signatures.on_grid(term.effect, term.members, term.starts)
+        own = grid(path.states, term.shape, term.response)
+        for name, change in path.changes(term.effect, own, term.response).items():
+            if name in out:
+                value, slope = out[name]
+                slope[place] = change[-1] * term.spread
+                out[name] = value + float(change[-1] @ sizes), slope
     return out
 
 

@@ -12,7 +12,7 @@ REPEATED = 0.5  # part of the rows of a record that stand in another of the same
 PICKED = 500  # rows that are compared
 ALIKE, AS_LARGE = 0.9, 0.02
 """Correlation of the noise of two columns, and ln of its sizes: of another gyro it is scaled."""
-SAME_NOISE = "their noise is the same row by row (simulated runs need a --seed each)"
+SAME_NOISE = ": their noise is the same row by row (simulated runs need a --seed each)"
 FEWEST_ALIKE, MOST_ALIKE = 50, 20_000  # rows that show it
 
 
@@ -21,16 +21,14 @@ def drop_repeats(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     kept: list[Record] = []
     said = []
     for record in records:
-        twin = next((other for other in kept if repeats(record, other)), None)
+        twin, how = next(((other, how) for other in kept if (how := _likeness(record, other)) is not None), (None, ""))
         if twin is None:
             kept.append(record)
             continue
         if len(record) > len(twin):
             place = next(k for k, one in enumerate(kept) if one is twin)
             kept[place], record, twin = record, twin, record
-        whole = f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out"
-        told = has_noise_of(record, twin) and not _same_rows(record, twin)
-        said.append(f"{whole}{': ' + SAME_NOISE if told else ''}.")
+        said.append(f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out{how}.")
     return kept, said + _overlaps(kept)
 
 
@@ -52,9 +50,16 @@ def _overlaps(records: Sequence[Record]) -> list[str]:
 
 def repeats(one: Record, two: Record) -> bool:
     """Whether two records are of one run: of the shorter, most rows stand in the other too, whatever their time, or one output scatters as the other does; noise never repeats itself."""
-    if one.sha256 and one.sha256 == two.sha256:
-        return True
-    return has_noise_of(one, two) or _same_rows(one, two)
+    return _likeness(one, two) is not None
+
+
+def _likeness(one: Record, two: Record) -> str | None:
+    """How two records are of one run, in words where it is not seen in their rows; None where they are not."""
+    if (one.sha256 and one.sha256 == two.sha256) or _same_rows(one, two):
+        return ""
+    shared = (key for key in OUTPUTS if key in one and key in two)
+    alike = len(one) == len(two) and any(_same_noise(one[key], two[key]) for key in shared)
+    return SAME_NOISE if alike else None
 
 
 def _same_rows(one: Record, two: Record) -> bool:
@@ -71,11 +76,6 @@ def _same_rows(one: Record, two: Record) -> bool:
     columns = ([np.nan_to_num(own[name][at], nan=np.inf).tolist() for name in names] for own, at in places)
     rows, there = (set(zip(*one, strict=True)) for one in columns)
     return len(rows & there) > REPEATED * len(picked)
-
-
-def has_noise_of(one: Record, two: Record) -> bool:
-    """Whether an output of one record scatters as that of the other does, row by row, about values of its own."""
-    return len(one) == len(two) and any(_same_noise(one[key], two[key]) for key in OUTPUTS if key in one and key in two)
 
 
 def _same_noise(one: Array, two: Array) -> bool:

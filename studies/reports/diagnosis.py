@@ -53,8 +53,8 @@ def shown(column: str, value: float | None, digits: int = 3) -> str:
 
 def headline(verdict: Verdict) -> str:
     """Return the verdict in a sentence, the causes in another, and in a third what they leave that noise does not."""
-    causes = "; ".join(map(name_cause, verdict.named))
-    others = (one for one in verdict.causes if one not in verdict.named)
+    known = verdict.named
+    causes, others = "; ".join(map(name_cause, known)), (one for one in verdict.causes if one not in known)
     strayed = ", ".join(f"{display_name(one.effect)} by {one.evidence**0.5:.1f} standard deviations" for one in others)
     left = "; ".join(
         f"{spell_structure(one.left_over_input)} in {spoken(name)}"

@@ -13,7 +13,7 @@ from studies.instrument.tables.law import BETWEEN, NO_LOAD
 from thermal.constants import Stefan_Boltzmann
 from thermal.meridian import cell_names
 from thermal.network import Boundary, Conductor, Network, Node, Part, Radiator, assemble, linearise
-from thermal.relaxation import find_relaxation
+from thermal.relaxation import Relaxation, find_relaxation
 from thermal.resonator import describe_resonator, describe_shell_and_stem
 
 if TYPE_CHECKING:
@@ -85,10 +85,15 @@ def build_shell_and_stem(instrument: "Instrument") -> Network:
     return assemble([Boundary("base"), *describe_shell_and_stem(replace(instrument.heat_path, housing_share=0.0))])
 
 
-def slowest_lag(network: Network, temperature: float) -> float:
-    """Slowest time constant (s) of the resonator behind its housing, in a whole heat path linearised at a temperature (K)."""
+def relax_behind_housing(network: Network, temperature: float) -> Relaxation:
+    """Return the modes of what the housing drives, of a whole heat path or of that part, linearised at a temperature (K)."""
     chain = behind_housing(network) if any(node.name == "housing" for node in network.nodes) else network
-    return float(find_relaxation(chain, temperature).time_constants[0])
+    return find_relaxation(chain, temperature)
+
+
+def slowest_lag(network: Network, temperature: float) -> float:
+    """Slowest time constant (s) of the resonator behind its housing."""
+    return float(relax_behind_housing(network, temperature).time_constants[0])
 
 
 def departures(network: Network, lumps: Sequence[str], temperature: float) -> dict[str, Array]:

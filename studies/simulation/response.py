@@ -20,11 +20,10 @@ from studies.effects.states import Lags, States
 from studies.errors import InputError, naming
 from studies.resonator.splitting import mean_shift
 from studies.simulation.drive import Drive
-from studies.simulation.heat_path import SENSOR, behind_housing
+from studies.simulation.heat_path import SENSOR, relax_behind_housing
 from studies.simulation.loop import DEG_PER_H, settled_columns
 from thermal.meridian import cell_names, energy_weights
 from thermal.network import Network
-from thermal.relaxation import find_relaxation
 from thermal.sweeping import cubic
 
 if TYPE_CHECKING:
@@ -81,10 +80,9 @@ def to_cells(instrument: "Instrument", law: "FrequencyLaw", share: Array) -> Arr
 
 def lags_of(instrument: "Instrument", law: "FrequencyLaw", network: Network) -> Lags:
     """Return the modes of the resonator behind its housing at the reference temperature: w = (c·v)(vᵀg)τ of the housing, (c·v)²τ of heat, c the cells' shares."""
-    chain = behind_housing(network) if "housing" in (node.name for node in network.nodes) else network
-    found = find_relaxation(chain, instrument.reference_temperature)
+    found = relax_behind_housing(network, instrument.reference_temperature)
     shares = np.ones(1) if instrument.polynomial is not None else cell_weights(instrument, law)
-    seen = shares @ found.shapes[[chain.index(name) for name in cell_names(len(shares))]]
+    seen = shares @ found.shapes[[found.nodes.index(name) for name in cell_names(len(shares))]]
     weights = np.stack([found.shapes.T @ found.coupling.sum(axis=1), seen]) * seen * found.time_constants
     weights /= weights.sum(axis=1, keepdims=True)
     kept = np.abs(weights).max(axis=0) > LEAST_MODE

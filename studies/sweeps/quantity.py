@@ -2,13 +2,15 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import nan
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import msgspec
 
-from shell.modes import Mode
 from studies.schema.keys import Keys, number, says
 from studies.sweeps.case import TOLERANCE, Case
+
+if TYPE_CHECKING:
+    from shell.modes import Mode
 
 SUFFIXES = {
     "Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "°": "_deg", "g": "_g", "mm": "_mm",
@@ -118,6 +120,6 @@ class OvertoneQuantity(ModeQuantity, frozen=True, kw_only=True):
         """Such as "n = 2", or "n = 2, mode 1" for a higher mode."""
         return f"n = {self.harmonic}" + (f", mode {self.index}" if self.index else "")
 
-    def mode(self, case: Case) -> Mode:
+    def mode(self, case: Case) -> "Mode":
         """Return the mode of a design."""
         return case.mode(self.harmonic, self.index, self.theory, case.temperature(self.temperature_degC))

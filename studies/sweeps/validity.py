@@ -5,7 +5,6 @@ from itertools import chain, product
 from typing import Any
 
 from shell.constants import zero_Celsius
-from shell.modes import THICKEST_SHELL
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.sweeps.definition import Study
 from studies.sweeps.design import nominal_design
@@ -40,6 +39,8 @@ def find_invalid(study: Study) -> list[str]:
 
 def _problem(study: Study, values: Mapping[str, Any]) -> str:
     """Return what makes a design impossible, or nothing."""
+    from shell.modes import THICKEST_SHELL
+
     words = ", ".join(f"{key} = {v:g}" if isinstance(v, float) else f"{key} = {v}" for key, v in values.items())
     try:
         instrument = set_parameters(study.instrument, values, study.derived)

@@ -1,12 +1,14 @@
 """How far the nearest other mode is from a mode, in Hz: parasitic modes close by couple under vibration."""
 
 from collections.abc import Iterable
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-from shell.modes import Mode, nearest_mode
 from studies.schema.keys import number, says
 from studies.sweeps.case import TOLERANCE, Case
 from studies.sweeps.quantity import Column, ModeQuantity, Number
+
+if TYPE_CHECKING:
+    from shell.modes import Mode
 
 
 class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separation"):
@@ -33,10 +35,12 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
         ]
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
+        from shell.modes import nearest_mode
+
         at = case.temperature(self.temperature_degC)
         own = case.mode(self.harmonic, 0, self.theory, at)
 
-        def solve(n: int, count: int) -> tuple[Mode, ...]:
+        def solve(n: int, count: int) -> "tuple[Mode, ...]":
             return case.modes(n, count, self.theory, at, TOLERANCE if n == self.harmonic else self.tolerance)
 
         nearest = nearest_mode(solve, own, range(self.highest + 1), self.each)
