@@ -49,6 +49,7 @@ EFFECT = Effect(
     grid=grid,
     sizes={"frequency_Hz": 5e-5, "bias_deg_per_h": 2.0},
     shape=(Parameter("relaxation_time_s", 600.0, 1e6, "time in which the stress relaxes"),),
+    memory="relaxation_time_s",
     steady=steady,
     steady_grid=lambda low, high: [
         (float(c),) for c in np.linspace(low + 0.15 * (high - low), high - 0.15 * (high - low), 29)
