@@ -19,7 +19,7 @@ from studies.inference.hypothesis import Hypothesis
 from studies.inference.linear import Shapes, Term
 from studies.inference.predicted import Model, Rows
 from studies.inference.search import LESS, SUSPICIOUS, Search
-from studies.inference.sharp import brief_events, fast_line, intermittent, recurring, switching, tails_of
+from studies.inference.sharp import brief_events, fast_line, intermittent, loudness, recurring, switching, tails_of
 
 ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 """Log evidence from which on structure is no chance."""
@@ -28,6 +28,10 @@ DRAWS = 8
 """Of normal noise, none of which may show as much switching: noise that keeps its level for some rows is no telegraph."""
 REPEATED, ROUNDING = 0.5, 1.3
 """Part of the readings that are as the one before, from which on they are rounded to more than their noise; the rms of that, in its own parts."""
+
+
+COARSE = 0.6
+"""Residual over the last digit, up to which it makes of noise what is brief, and levels."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,7 @@ def look(
     """Return what a model leaves of every response, on `rows` of the records; `plain` has no effects, or another heat path."""
     seen = search.scan(final, bank, less=())
     own = Background(search.linear, final.terms, final.noise)
-    longer = isinstance(plain, Model)
+    longer, problem = isinstance(plain, Model), search.linear.problem
     before = Background(plain.linear if isinstance(plain, Model) else search.linear, plain.terms, final.noise)
     found = {}
     for name in search.linear.responses:
@@ -91,14 +95,21 @@ def look(
         level, rest = search.linear.rows[name], own.residual(name)
         white = level.whiten(rest, final.noise[name])
         apart = [np.sign(rest[place]) * (far > 1) for place, far in zip(level.slices, level.stretch, strict=True)]
-        brief = max(brief_events(white, tails_of(white / max(float(np.std(white)), 1e-300))), recurring(apart))
+        # readings between two digits are two levels, one of them at times brief
+        coarse = name in rows and rows[name].rms < COARSE * _digit(problem, name)
+        brief = (
+            -np.inf
+            if coarse
+            else max(brief_events(white, tails_of(white / max(float(np.std(white)), 1e-300))), recurring(apart))
+        )
         if brief > evidence:
             word, evidence = "time: brief events", brief
-        fitful = intermittent([white[place] for place in level.slices])
+        even = white / _louder(problem, name, rows[name]) if name in rows else white
+        fitful = intermittent([even[place] for place in level.slices])
         if fitful > evidence:
             word, evidence = "time: an intermittent oscillation", fitful
         # levels between which a form of an input goes would be two as well
-        switches = _switching(search, final, name, rest) if smooth <= ENOUGH else -np.inf
+        switches = _switching(search, final, name, rest) if smooth <= ENOUGH and not coarse else -np.inf
         if switches > evidence:
             word, evidence = SWITCH.name, switches
         fast = _line(search, name, rows.get(name))
@@ -110,7 +121,7 @@ def look(
         if evidence > smooth and (named or longer):
             gained = max(own.evidence - before.evidence, 0.0)
             share = min(share, gained / max(gained + evidence, 1e-9))
-        if name in rows and is_rounding(search.linear.problem, name, rows[name]):
+        if name in rows and is_rounding(problem, name, rows[name]):
             word, evidence, line = "the last digit of the readings", min(evidence, 0.0), None
         found[name] = Leftover(word, float(evidence), share, len(mine), line)
     return found
@@ -118,9 +129,23 @@ def look(
 
 def is_rounding(problem: CardProblem, name: str, rest: Rows) -> bool:
     """Whether what is left of readings that mostly repeat is what a step of q leaves, q/√12: it follows the level as structure does."""
-    readings = [problem.runs[part.run].own_rows[name][1] for part in problem.members(name)]
-    repeats = np.concatenate([np.diff(own) == 0.0 for own in readings])
-    return repeats.mean() > REPEATED and rest.rms < ROUNDING * find_step(np.concatenate(readings)) / 12**0.5
+    repeats = np.concatenate([np.diff(own) == 0.0 for own in _readings(problem, name)])
+    return repeats.mean() > REPEATED and rest.rms < ROUNDING * _digit(problem, name) / 12**0.5
+
+
+def _readings(problem: CardProblem, name: str) -> list[Array]:
+    return [problem.runs[part.run].own_rows[name][1] for part in problem.members(name)]
+
+
+def _digit(problem: CardProblem, name: str) -> float:
+    """Step to which readings are rounded."""
+    return find_step(np.concatenate(_readings(problem, name)))
+
+
+def _louder(problem: CardProblem, name: str, rest: Rows) -> Array:
+    """How many times louder than usual the noise of the rows in each block is."""
+    means = problem.block_means(name, [loudness(own) for own in rest.residual])
+    return np.sqrt(np.maximum(np.concatenate(means), 1.0))
 
 
 def _instead_of_noise(search: Search, bank: Sequence[Shapes], final: Hypothesis, name: str) -> Hypothesis | None:

@@ -49,6 +49,15 @@ def intermittent(runs: Sequence[Array]) -> float:
     return best - 3.0
 
 
+def loudness(rows: Array) -> Array:
+    """Return the variance of noise about each row over that of all, from differences of `NEAR` neighbours: noise may be louder for a while."""
+    change = np.pad(np.diff(rows) ** 2, (NEAR // 2, NEAR - NEAR // 2), "edge")
+    return np.asarray(
+        np.convolve(change, np.ones(NEAR), "valid")[: len(rows)] / NEAR / max(float(np.mean(change)), 1e-300)
+    )
+
+
+NEAR = 25
 CELLS = (8, 16, 32, 64, 128)
 """Rows to a short periodogram."""
 FEWEST_CELLS = 6

@@ -428,10 +428,11 @@ def test_a_chamber_logged_by_another_clock_in_one_run_is_found():
     assert cause.parameters["run"].value == 2.0
 
 
+@pytest.mark.usefixtures("fine")
 def test_what_rounding_leaves_is_no_structure():
-    """A bias that follows the temperature, read in steps far above its noise: it was unexplained, or had a cross-damping."""
-    step, noise = 0.25, 0.005
-    t = np.arange(0.0, 8 * 3600.0, 20.0)
+    """A bias read in steps far above its noise, which was unexplained, or had a cross-damping; a 1/Q between two readings, which were two levels."""
+    step, noise, digit = 0.25, 0.005, 4.4e-10
+    t = np.arange(0.0, 12 * 3600.0, 60.0)
     housing = lag(t, 20.0 + 25.0 * np.sin(2.0 * np.pi * t / 9000.0), 300.0)
     x, rng = lag(t, housing, 1500.0) - 20.0, np.random.default_rng(4)
     columns = {
@@ -439,5 +440,6 @@ def test_what_rounding_leaves_is_no_structure():
         "housing_temperature_degC": housing,
         "frequency_Hz": 4432.0 + 0.37 * x + 2e-3 * rng.standard_normal(t.size),
         "bias_deg_per_h": np.round((0.05 * x + noise * rng.standard_normal(t.size)) / step) * step,
+        "inverse_q": np.round(120.7 + 0.012 * x + 0.25 * rng.standard_normal(t.size)) * digit,
     }
     assert diagnose_records([Record(columns, path="run.csv", sha256="1")]).verdict.verdict == "adequate"

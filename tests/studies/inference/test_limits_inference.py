@@ -18,7 +18,7 @@ from studies.inference.polynomial_card import polynomial_card
 from studies.inference.predicted import Kept, Model
 from studies.inference.pursuit import Pursuit
 from studies.inference.search import Search
-from studies.inference.sharp import recurring, switching
+from studies.inference.sharp import intermittent, loudness, recurring, switching
 from studies.inference.signatures import Signatures
 from studies.instrument.card import load_card
 from studies.simulation.chamber import load_profile
@@ -248,6 +248,19 @@ def test_outliers_that_recur_side_by_side_are_events():
         alone = np.zeros(800)
         alone[np.random.default_rng(seed).choice(400, 12, replace=False) * 2] = 1.0
         assert recurring([alone]) == -np.inf
+
+
+@pytest.mark.parametrize(("amplitude", "found"), [(0.0, False), (3.0, True)])
+def test_noise_that_is_louder_for_a_while_is_no_oscillation_and_hides_none(amplitude, found):
+    """Blocks of four rows: bursts of four times the noise were one, with evidence of 20 to 80."""
+    rng = np.random.default_rng(3)
+    on = np.repeat(rng.random(120) < 0.15, 30)
+    rows = rng.standard_normal(3600) * np.where(on, 4.0, 1.0)
+    rows[1200:2000] += amplitude * np.sin(2 * np.pi * np.arange(800) / 30.0)
+    blocks, louder = (own.reshape(-1, 4).mean(1) for own in (rows, loudness(rows)))
+    assert intermittent([blocks / np.std(blocks)]) > 12.0
+    even = blocks / np.sqrt(np.maximum(louder, 1.0))
+    assert (intermittent([even / np.std(even)]) > 12.0) == found
 
 
 def test_two_levels_are_found_and_their_switches_cost_what_a_chain_gives():
