@@ -230,9 +230,11 @@ def trim_voltages(electrodes: Electrodes, z: complex, limit: float) -> Trim:
     sides = np.concatenate([aim, np.zeros(count)])
     sought = lsq_linear(np.vstack([effect, LIGHT * np.eye(count)]), sides, (0.0, 1.0), "bvls", tol=1e-15)
     if float(np.hypot(*(effect @ sought.x - aim))) > 1e-6 * float(np.hypot(*aim)):
-        hertz = electrodes.pair.mode.frequency
+        n, hertz = electrodes.pair.mode.harmonic, electrodes.pair.mode.frequency
+        if not (most := hertz * along(electrodes, z, limit)):
+            raise ShellError(f"no voltage on these electrodes nulls a split along this axis: set others, such as {8 * n} around, or trim by mass.")  # fmt: skip
         raise ShellError(
-            f"{limit:g} V on these electrodes null a split of at most {hertz * along(electrodes, z, limit):.3g} Hz along this axis "
+            f"{limit:g} V on these electrodes null a split of at most {most:.3g} Hz along this axis "
             f"({hertz * reach(electrodes, limit):.3g} Hz along any), not {hertz * abs(z):.4g} Hz: raise the voltage, narrow the gap, "
             "set more or other electrodes, or trim by mass first."
         )

@@ -33,6 +33,7 @@ MANY = Parameter(consume_multiple=True)
 COUNT = numbers(lambda one: one >= 1, "at least 1")
 WHOLE = numbers(lambda one: one >= 0, "0 or above")
 POSITIVE = numbers(lambda one: 0 < one < inf, "positive")
+ORDER = numbers(lambda one: 1 <= one <= 9, "1 to 9")  # of a polynomial over temperature
 FRACTION = numbers(lambda one: 0 < one < 1, "between 0 and 1")
 
 CARD = "Path of a card, or the name of a built-in one (hrg cards)."

@@ -55,12 +55,13 @@ def electrodes(
             z = whole.split.squares[1]
         factor, most = charged.pull_in, reach(charged, limit)
         asked = split is not None or whole.split.resolved
+        trim, beyond = None, ""
         try:
             trim = trim_voltages(charged, z, limit) if asked else None
-        except ShellError:
+        except ShellError as error:
             if split is not None:
                 raise
-            trim = None  # the card's own split only where it can be nulled
+            beyond = f"The card's split is not nulled: {error}"
     nulled = trim and {
         "voltages_V": trim.voltages, "left_Hz": abs(trim.left) * mode.frequency, "shift_ppm": 1e6 * trim.shift
     }  # fmt: skip
@@ -81,12 +82,12 @@ def electrodes(
         payload,
         f"Electrodes of {instrument.name}",
         f"Effect of the electrodes on the pair n = {harmonic} at {mode.frequency:.3f} Hz and {T - zero_Celsius:g} °C.",
-        _parts(payload, abs(z) * mode.frequency if asked else 0.0, own.resolved, keys),
+        _parts(payload, abs(z) * mode.frequency, beyond, own.resolved, keys),
     )
 
 
-def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: ElectrodeKeys) -> list[Part]:
-    """What people read; `split` in Hz is the one to be nulled, 0 for none; `resolved` says whether the voltages make one."""
+def _parts(payload: dict[str, Any], split: float, beyond: str, resolved: bool, keys: ElectrodeKeys) -> list[Part]:
+    """What people read; `split` in Hz is the one to be nulled, `beyond` why it is not; `resolved` says whether the voltages make one."""
     factor, limit, trim = payload["pull_in_factor"], payload["limit_V"], payload["trim"]
     where = f"{payload['frequency_Hz']:.3f} Hz at {payload['temperature_degC']:g} °C"
     quantities = (
@@ -100,15 +101,14 @@ def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: Electrod
     title = f"{payload['card']}, n = {payload['harmonic']}, {where}"
     head = Table(title, quantities, "0: quantity | 1: value | 2: unit")
     if trim is None:
-        words = f"{limit:g} V cannot null the card's split of {1e3 * split:.4g} mHz; see hrg trim."
-        return [head, Sentence(words, "warning") if split else None]
+        return [head, Sentence(beyond, "warning") if beyond else None]
     step = 360 / keys.count
     voltages = [
-        {"electrode": k, "azimuth": keys.azimuth_deg + step * k, "voltage": v}
-        for k, v in enumerate(trim["voltages_V"])
+        {"electrode": k, "azimuth": keys.azimuth_deg + step * (k - 1), "voltage": v}
+        for k, v in enumerate(trim["voltages_V"], 1)
         if v > DUST * max(trim["voltages_V"])
     ]
     title = f"Trim voltages for a split of {1e3 * split:.4g} mHz, in addition to the card's own voltages"
-    note = f"They lower the frequency of the pair by {abs(trim['shift_ppm']):.3g} ppm. Squares of voltages add; in a card these are trim_V."
+    note = f"They lower the frequency of the pair by {abs(trim['shift_ppm']):.3g} ppm. Squares of voltages add; in a card they are trim_V, in order from electrode 1 at azimuth_deg."
     columns = "electrode | azimuth: azimuth (°) .2f | voltage: voltage (V) .4"
     return [head, Table(title, voltages, columns, note)]

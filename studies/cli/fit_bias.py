@@ -1,9 +1,9 @@
 """`hrg fit bias`: the zero-rate output as a function of the gyro's own frequency and its rate of change."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from compensation.bias_selection import Method
-from studies.cli.arguments import Records, SaveModel
+from studies.cli.arguments import POSITIVE, Records, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.fits.bias import BiasStudy, Judged, study_bias
 from studies.models.kinds.bias import name_term
@@ -17,8 +17,8 @@ from studies.results import Chapter, Result, Sentence, row_of
 def fit_bias(
     *data: Records,
     method: Literal["guarded", "paper"] = "guarded",
-    average: float | None = None,
-    window: float | None = None,
+    average: Annotated[float | None, POSITIVE] = None,
+    window: Annotated[float | None, POSITIVE] = None,
     causal: bool = False,
     over: Literal["auto", "frequency", "temperature"] = "auto",
     save: SaveModel = None,

@@ -1,13 +1,14 @@
 """`hrg fit cross-damping`: the bias of a CVG from cross-damping over temperature."""
 
 import math
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from compensation.constants import NINETY
 from compensation.improvement import Change
-from studies.cli.arguments import Records, SaveModel
+from shell.constants import zero_Celsius
+from studies.cli.arguments import ORDER, POSITIVE, Records, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError, naming
 from studies.fits.cross_damping import CrossDampingStudy, study_cross_damping
@@ -39,9 +40,9 @@ HELD_OUT = "Before: standard deviation; after: rms. Held out: each run, or each 
 @answers("hrg.fit-cross-damping/1")
 def fit_cross_damping(
     *data: Records,
-    frequency: float | None = None,
-    quality: float | None = None,
-    order: int = 3,
+    frequency: Annotated[float | None, POSITIVE] = None,
+    quality: Annotated[float | None, POSITIVE] = None,
+    order: Annotated[int, ORDER] = 3,
     calibration_temperature: float = 20.0,
     save: SaveModel = None,
 ) -> Result:
@@ -64,7 +65,7 @@ def fit_cross_damping(
     if not (0 < carrier < 1e9 and 1 < quality < 1e12):
         wrong = f"--quality {quality:g}" if 0 < carrier < 1e9 else f"--frequency {carrier:g}"
         raise InputError(f"{wrong}: {carrier:g} Hz with Q = {quality:g} is not a resonator; correct the option or the columns of the record.")  # fmt: skip
-    if not abs(calibration_temperature) <= 1000:
+    if not -zero_Celsius < calibration_temperature <= 1000:
         raise InputError(f"--calibration-temperature {calibration_temperature:g} °C: no gyro has this temperature; give one within the record, in °C.")  # fmt: skip
     gathered = gather_rest(records, OUTPUTS)
     with naming(", ".join(data)):

@@ -2,9 +2,10 @@
 
 from collections import Counter
 from pathlib import Path
+from typing import Annotated
 
 from compensation.arrays import Array
-from studies.cli.arguments import SaveModel
+from studies.cli.arguments import ORDER, POSITIVE, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError, naming
 from studies.files.columns import read_header
@@ -28,12 +29,12 @@ SOAKS = (
 def fit_frequency(
     table: str,
     *more: str,
-    order: int = 3,
+    order: Annotated[int, ORDER] = 3,
     reference_temperature: float = 0.0,
     resolution: float | None = None,
     save: SaveModel = None,
-    time_constant: float = 3000.0,
-    left: float = 0.05,
+    time_constant: Annotated[float, POSITIVE] = 3000.0,
+    left: Annotated[float, POSITIVE] = 0.05,
 ) -> Result:
     """Fit a polynomial to frequency over temperature and invert it (HRG paper, equations 16 to 18, Table 2).
 

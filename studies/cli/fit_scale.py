@@ -2,17 +2,18 @@
 
 import re
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 from compensation.bell import PolynomialCurve
 from compensation.rate_law import CARRIED, SURE, RateCurve, RateLaw
-from studies.cli.arguments import Records, SaveModel
-from studies.cli.output import answers, keep_model
+from studies.cli.arguments import COUNT, POSITIVE, Records, SaveModel
+from studies.cli.output import answers, keep_model, say
 from studies.fits.scale import ScaleStudy, study_scale
 from studies.models import source_of
 from studies.models.kinds.scale import save_scale
 from studies.papers.bvg import ERRORS, SOURCES, draw_steps, steps_table
 from studies.record import read_record
+from studies.record.repeated import drop_repeats
 from studies.reports.digits import raised
 from studies.results import Chapter, Facts, Figure, Result, Sentence, Table, row_of
 
@@ -33,7 +34,11 @@ NOTE = "Each step is fitted to the output of the steps before it; its errors ass
 
 @answers("hrg.fit-scale/1")
 def fit_scale(
-    *data: Records, cutoff: float = 1.0, order: int = 50, no_filter: bool = False, save: SaveModel = None
+    *data: Records,
+    cutoff: Annotated[float, POSITIVE] = 1.0,
+    order: Annotated[int, COUNT] = 50,
+    no_filter: bool = False,
+    save: SaveModel = None,
 ) -> Result:
     """Fit null, bias over temperature, and scale over rate and over temperature (BVG paper, equations 32 to 36).
 
@@ -50,7 +55,9 @@ def fit_scale(
         order: Order of the FIR filter; the paper uses 50.
         no_filter: Omit the FIR filter; the record may then have gaps.
     """
-    records = [read_record(path) for path in data]
+    records, repeated = drop_repeats([read_record(path) for path in data])
+    for sentence in repeated:
+        say(f"warning: {sentence}")
     study = study_scale(records, None if no_filter else cutoff, order)
     sources = tuple(source_of(record) for record in records)
     chain = replace(study.chain, warming=study.warming)

@@ -12,6 +12,7 @@ from shell.modes import Mode, solve_modes
 from shell.spin import SpinShift, spin_shift
 from studies.cli.arguments import (
     POSITIVE,
+    WHOLE,
     Card,
     FromDegC,
     Harmonic,
@@ -45,7 +46,7 @@ def loads(
     along: float = 1.0,
     across: float = 1.0,
     rotation: float = 0.0,
-    pressure: float = 0.0,
+    pressure: Annotated[float, WHOLE] = 0.0,
     gradient: float = 0.0,
     strength: Annotated[float | None, POSITIVE] = None,
     harmonic: Harmonic = 2,

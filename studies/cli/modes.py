@@ -233,10 +233,12 @@ def _note(theory: str, share: float) -> str:
 
 
 def _all_orders(modes: list[Entry]) -> list[Sentence]:
+    from shell.imperfection.split import ROUNDING
+
     found = []
     for row in modes:
         one, every = (row.get("split", {}).get(key, 0.0) for key in ("split_Hz", "every_order_split_Hz"))
-        if abs(one - every) > FAR * max(one, every):
+        if abs(one - every) > max(FAR * max(one, every), ROUNDING * row["frequency_Hz"]):
             found.append(f"n = {row['harmonic']} ({one:.3g} and {every:.3g} Hz)")
     words = "to first order and of all orders the splits differ by more than 10 %"
     return [Sentence(f"The imperfections are large: {words} for {', '.join(found)}.", "warning")] if found else []

@@ -84,7 +84,7 @@ def thermal(
             Figure(lambda: _curves(transient, chamber, weights, names), "Temperatures in time."),
             Table("Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
                 rows_of(housed | temperatures), ["time_s: time (s) .0f | chamber_temperature_degC: chamber .3f", *(f"{name}: {name} .3f" for name in names)],
-                f"Shell: mean temperature. The heat balance closes within {energy.error:.0e} of the heat exchanged."),
+                "Shell: mean temperature." + f" The heat balance closes within {energy.error:.0e} of the heat exchanged." * (energy.turnover > 0)),
         ],
     )  # fmt: skip
 

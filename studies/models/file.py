@@ -147,9 +147,9 @@ class Model(ModelKeys, frozen=True, kw_only=True):
         if self.compensates not in outputs:
             raise InputError(f"{self.where}: a {self.kind} model compensates {' or '.join(outputs)}.")
 
-    def check_names(self, part: ModelPart, prefix: str) -> None:
-        """Refuse coefficients of a polynomial that are not prefix0, prefix1, … in this order; InputError says so."""
-        expected = tuple(f"{prefix}{k}" for k in range(len(part.coefficients)))
+    def check_names(self, part: ModelPart, prefix: str, first: str = "") -> None:
+        """Refuse coefficients of a polynomial that are not prefix0 (or `first`), prefix1, … in this order; InputError says so."""
+        expected = (first or f"{prefix}0", *(f"{prefix}{k}" for k in range(1, len(part.coefficients))))
         if part.names != expected:
             names = ", ".join(expected)
             raise InputError(f"{self.where} [[part]] {part.name}: the coefficients must be {names}, in this order.")

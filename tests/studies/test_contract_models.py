@@ -146,6 +146,7 @@ def test_a_measured_rate_is_judged_by_its_error(tmp_path, ask):
             "temperature_dgC = [0.0, 1.0]\ntemperature_degC = [",
             "did you mean 'temperature_degC'",
         ),
+        ('"a1"', '"a7"', "the coefficients must be f0, a1, a2, a3, in this order"),
         ('unit = "Hz/degC"', 'unit = "mHz/degC"', "'a1' must be in Hz/degC, not mHz/degC"),
         (
             "[[source]]",

@@ -315,11 +315,17 @@ def test_settled_rows():
     assert settled_rows(rate, 2).tolist() == [True, True, True, False, False, True, True, False, False]
 
 
+def test_a_record_given_twice_counts_once(records, tmp_path, ask, refuse):
+    once, twice = (ask(["fit", "scale", *[records[0]] * n])["rate_law"]["forms"] for n in (1, 2))
+    assert once == twice
+    other = write(tmp_path / "other.csv", simulate_runs(np.random.default_rng(3))[1])
+    assert "both runs at rest" in refuse(["fit", "scale", *records[:2], other])
+
+
 @pytest.mark.parametrize(
     ("files", "more", "words"),
     [
         ([1, 2], [], "of several rates"),
-        ([0, 1, 1], [], "both runs at rest"),
         ([], [], "DATA is missing"),
         (
             [0, 1, 2],

@@ -110,6 +110,8 @@ def test_a_settled_network_stays_where_it_is():
     T = integrate(network, rest).at(np.linspace(0.0, 3600.0, 50))
     assert np.ptp(T, axis=0).max() < 1e-8
     assert T[0, 2] > 293.15 + 1.0
+    still = assemble(RADIATIVE)
+    assert check_energy(still, rest, integrate(still, rest)).error == 0.0  # it was 0.8 of rounding
 
 
 def test_a_profile_with_many_rows_is_integrated_through_its_jump():

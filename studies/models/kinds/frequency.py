@@ -36,7 +36,9 @@ def save_frequency(fit: FrequencyFit, sources: tuple[ModelSource, ...], made_by:
 
 def known(model: Model) -> Known:
     """Return the keys of a model of the frequency, and the units of its polynomial."""
-    return Known((REFERENCE,), (VARIABLE,), {"frequency": _units(len(model.part("frequency").values))})
+    part = model.part("frequency")
+    model.check_names(part, "a", "f0")
+    return Known((REFERENCE,), (VARIABLE,), {"frequency": _units(len(part.values))})
 
 
 def _units(count: int) -> list[str]:
