@@ -58,12 +58,14 @@ def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: flo
     check_time(t)
     for name, column in arrays.items():
         if column.shape != t.shape:
-            raise CompensationError(f"'{name}' has {column.size} values for {t.size} times; they must be equally many.")
+            raise CompensationError(
+                f"'{name}' has {column.size} value{'s' * (column.size != 1)} for {t.size} times; they must be equally many."
+            )
     if not width > 0:
         raise CompensationError(f"the length of a block must be positive, not {width:g} s.")
     present = np.all([np.isfinite(column) for column in arrays.values()], axis=0)
     if np.count_nonzero(present) < NEIGHBOURS:
-        raise CompensationError(f"only {np.count_nonzero(present)} rows have a value in each of {', '.join(arrays)}; record more.")  # fmt: skip
+        raise CompensationError(f"only {(there := np.count_nonzero(present))} row{'s have' if there != 1 else ' has'} a value in each of {', '.join(arrays)}; record more.")  # fmt: skip
     keep = present.copy()
     for column in arrays.values():
         keep[present] &= ~find_spikes(column[present])

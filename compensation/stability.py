@@ -85,7 +85,7 @@ def allan_deviation(
         raise CompensationError(f"an Allan deviation needs at least 9 samples in a row, not {y.size}; record longer.")
     if not np.all(np.isfinite(y)):
         raise CompensationError(
-            f"the output has {np.count_nonzero(~np.isfinite(y))} missing values; an Allan deviation needs an unbroken series: average over blocks first, or cut the record at its gaps."
+            f"the output has {(lost := np.count_nonzero(~np.isfinite(y)))} missing value{'' if lost == 1 else 's'}; an Allan deviation needs an unbroken series: average over blocks first, or cut the record at its gaps."
         )
     if not step > 0:
         raise CompensationError(f"the sampling step must be positive, not {step:g} s.")

@@ -28,3 +28,8 @@ def naming(place: str | Path) -> Iterator[None]:
         yield
     except (ShellError, ThermalError, CompensationError) as error:
         raise InputError(f"{place}: {error}") from error
+
+
+def numbered(count: int, what: str) -> str:
+    """Return how many there are, in words: 1 row, 2 rows."""
+    return f"{count} {what}{'' if count == 1 else 's'}"

@@ -117,7 +117,7 @@ def parse_profile(words: str) -> Profile:
         names, build = FORMS[kind]
         if len(arguments) != len(names):
             durations = " (durations without a space: 5h, 30min, 90s)" if {"DURATION", "HOLD"} & set(names) else ""
-            raise ThermalError(f"'{' '.join(sentence)}' has {len(arguments)} values after '{kind}', not {len(names)}; write '{kind} {' '.join(names)}'{durations}.")  # fmt: skip
+            raise ThermalError(f"'{' '.join(sentence)}' has {len(arguments)} value{'s' * (len(arguments) != 1)} after '{kind}', not {len(names)}; write '{kind} {' '.join(names)}'{durations}.")  # fmt: skip
         given = " ".join(sentence)
         values = [_read(name, text, given) for name, text in zip(names, arguments, strict=True)]
         try:

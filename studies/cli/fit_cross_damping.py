@@ -10,7 +10,7 @@ from compensation.improvement import Change
 from shell.constants import zero_Celsius
 from studies.cli.arguments import ORDER, POSITIVE, Records, SaveModel
 from studies.cli.output import answers, keep_model, say
-from studies.errors import InputError, naming
+from studies.errors import InputError, naming, numbered
 from studies.fits.cross_damping import CrossDampingStudy, study_cross_damping
 from studies.models import source_of
 from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
@@ -79,7 +79,11 @@ def fit_cross_damping(
     changes = [{"label": label} | summary[key] for key, label in LABELS.items()]
     fitted, held_out = study.training.averages, study.held_out.averages
     residual, dynamic = summary["held_out_averages_100s"]["after"], summary["dynamic_part"]
-    left = f"{gathered.left_out} rows with an empty cell or an outlier were left out." if gathered.left_out else ""
+    left = (
+        f"{numbered(gathered.left_out, 'row')} with an empty cell or an outlier were left out."
+        if gathered.left_out
+        else ""
+    )
     averaged = f"Long records were averaged over {gathered.block_s:g} s before the fit." if gathered.block_s else ""
     return Result(
         {"records": list(data), **summary},

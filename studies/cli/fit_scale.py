@@ -8,6 +8,7 @@ from compensation.bell import PolynomialCurve
 from compensation.rate_law import CARRIED, SURE, RateCurve, RateLaw
 from studies.cli.arguments import COUNT, POSITIVE, Records, SaveModel
 from studies.cli.output import answers, keep_model, say
+from studies.errors import numbered
 from studies.fits.scale import ScaleStudy, study_scale
 from studies.models import source_of
 from studies.models.kinds.scale import save_scale
@@ -173,7 +174,7 @@ def _remarks(study: ScaleStudy) -> list[str | Sentence]:
         for what, record in _undetermined(study)
     ]
     said = {
-        f"{study.left_out} rows with an empty cell or an outlier were left out.": study.left_out,
+        f"{numbered(study.left_out, 'row')} with an empty cell or an outlier were left out.": study.left_out,
         "The rough null and scale are from the record at rest and then at one rate.": study.rough_run,
         "Long records were averaged in blocks before the fit; the held-out error is that of the blocks.": study.averaged,
     }

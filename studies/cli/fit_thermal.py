@@ -32,8 +32,8 @@ NEGATIVE = (
     " otherwise than a cubic. The constants are effective values and may lie outside their intervals."
 )
 MISFIT = (
-    "Slow noise of the residual is {:.1f} times that of a row. Either the noise drifts or the gyro is not a chain of this many lags; in the"
-    " second case the constants are effective values and may lie outside their intervals."
+    "The residual wanders {:.1f} times as far as single rows scatter. Either the noise of the frequency drifts, or the gyro is no chain of this many"
+    " lags: then the constants describe these records only, and the true ones may lie outside the intervals."
 )
 
 

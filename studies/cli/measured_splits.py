@@ -6,7 +6,7 @@ from math import radians
 
 import msgspec
 
-from studies.errors import InputError
+from studies.errors import InputError, numbered
 from studies.files.reading import read_bytes
 from studies.instrument.card import Instrument
 
@@ -29,7 +29,7 @@ def pair_splits(
         raise InputError("--split is missing: give the measured splits (Hz), each with its --axis (degrees), or a card with a measured split ('hrg fit ringdown --save').")  # fmt: skip
     for option, given in (("--axis", axis), ("--harmonic", harmonic)):
         if len(given) != len(split):
-            found = "is missing" if not given else f"has {len(given)} values"
+            found = "is missing" if not given else f"has {numbered(len(given), 'value')}"
             raise InputError(f"{option} {found}: give one for each --split, of which there {'is 1' if len(split) == 1 else f'are {len(split)}'}.")  # fmt: skip
     if min(harmonic) < 1:
         raise InputError(f"--harmonic {min(harmonic)}: split modes have n = 1 or higher.")

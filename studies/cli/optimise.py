@@ -13,6 +13,7 @@ from studies.design.answer import Answer
 from studies.design.run import CARD, TABLE, best_instrument
 from studies.design.run import optimise as find_best
 from studies.design.task import shown
+from studies.errors import numbered
 from studies.reports import style
 from studies.reports.digits import plain
 from studies.reports.scenes import moving_mode, show_mode
@@ -53,7 +54,7 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
         "best_card": str(Path(out) / CARD),
     }
     count = len(found.task.keys.objective)
-    lead = f"{_number(found.task.free, 'parameter')}, {_number(count, 'objective')}, {_number(len(found.limits), 'limit')}: {found.evaluations} designs solved in full."
+    lead = f"{numbered(found.task.free, 'parameter')}, {numbered(count, 'objective')}, {numbered(len(found.limits), 'limit')}: {numbered(found.evaluations, 'design')} solved in full."
     return Result(payload, f"Design {found.task.name}", lead, _parts(found, payload))
 
 
@@ -144,10 +145,6 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
             Table("Designs that could not be computed", reasons.most_common(8), "1: designs | 0: reason", where="page"),
         ]),
     ]  # fmt: skip
-
-
-def _number(count: int, what: str) -> str:
-    return f"{count} {what}{'s' * (count != 1)}"
 
 
 def _draw_history(found: Answer) -> Drawing:

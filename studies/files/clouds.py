@@ -36,7 +36,7 @@ def read_cloud(path: str | Path, unit: Unit = "mm") -> Array | FaceGrid:
     else:
         first, skipped = _first_line(file)
         if first.lower().startswith(GRID):
-            return _read_grid(file, skipped)
+            return _read_grid(file, first, skipped)
         if not any(sign.isdigit() for sign in first):  # names of the columns
             first, skipped = _first_line(file, skipped + 1)
         points = _read_text(file, first, skipped)
@@ -91,14 +91,20 @@ def _read_mesh(path: Path) -> Array:
 FEWEST = 8  # azimuths of a table
 
 
-def _read_grid(path: Path, skipped: int) -> FaceGrid:
+def _read_grid(path: Path, first: str, skipped: int) -> FaceGrid:
     import pandas as pd
 
-    try:
-        table = pd.read_csv(path, skiprows=skipped, comment="#", dtype=float, index_col=0)
-        azimuth = np.deg2rad(table.columns.to_numpy(dtype=float))
-    except (ValueError, pd.errors.ParserError):
-        raise InputError(f"{path}: is not a table of deviations: after the line {GRID},0,5,10,… every cell must be a number or empty.") from None  # fmt: skip
+    separator = next((one for one in ";\t" if one in first), ",")
+    form: dict[str, Any] = {"sep": separator, "skiprows": skipped, "comment": "#", "dtype": float, "index_col": 0}
+    for decimal in "." if separator == "," else ".,":
+        try:
+            table = pd.read_csv(path, **form, decimal=decimal)
+            azimuth = np.deg2rad([float(name.replace(decimal, ".")) for name in table.columns])
+            break
+        except (ValueError, pd.errors.ParserError):
+            continue
+    else:
+        raise InputError(f"{path}: is not a table of deviations: after the line {GRID},0,5,10,… every cell must be a number or empty.")  # fmt: skip
     position = table.index.to_numpy(dtype=float)
     order = np.argsort(position)
     if len(position) < 1 or np.any(np.diff(position[order]) <= 0) or position.min() < 0 or position.max() > 1:

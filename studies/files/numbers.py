@@ -12,7 +12,7 @@ from typing import IO, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.errors import InputError
+from studies.errors import InputError, numbered
 from studies.files.reading import MOST_BYTES, PORTION, opened, read_bytes
 from studies.progress import tell
 
@@ -110,7 +110,9 @@ def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: in
                     f"{path}, line {number}: comments are allowed only above the header; move it there, or split the file here if another begins."
                 )
             if len(cells) != len(names):
-                raise InputError(f"{path}, line {number}: {len(cells)} values where the header has {len(names)} columns ({', '.join(names)}); decimal commas must become points.")  # fmt: skip
+                raise InputError(f"{path}, line {number}: {numbered(len(cells), 'value')} where the header has {len(names)} columns ({', '.join(names)}); decimal commas must become points.")  # fmt: skip
+            if not rows and not any(is_number(cell.strip()) for cell in cells) and any(cells):
+                raise InputError(f"{path}, line {number}: a line of units, as it seems: take it out, or let 'hrg import' read the file, which converts by them.")  # fmt: skip
             rows.append([_number(path, number, name, cell) for name, cell in zip(names, cells, strict=True)])
     except csv.Error as error:
         raise InputError(f"{path}, line {first_line + reader.line_num - 1}: {error}.") from None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compensation.arrays import Array
-from studies.errors import InputError
+from studies.errors import InputError, numbered
 from studies.files.given import shorten
 from studies.files.stored import PORTION, Stored
 from studies.importing.mapping import NUMERIC_TIMES, OWN, SECONDS, UNIX, FileMap
@@ -102,7 +102,9 @@ class Clock:
         if zone and origin is not None:
             self.origin = _with_offset(origin, datetime.timedelta(seconds=first or 0.0))
         if twice:
-            self.notes.append(f"{twice} rows in the hour that {zone} has twice, distinguished by their order")
+            self.notes.append(
+                f"{numbered(twice, 'row')} in the hour that {zone} has twice, distinguished by their order"
+            )
         if rate:
             self.notes.append(f"its clock runs {rate * 1e6:g} ppm fast: times divided by {1 + rate!r}")
         if file.clock_offset and file.sample_period is None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
-from studies.errors import InputError
+from studies.errors import InputError, numbered
 from studies.files.stored import Stored, portions
 from studies.importing.mapping import SECONDS, FileMap
 from studies.importing.tables import Rows
@@ -122,11 +122,13 @@ class Order:
         """What was done, in words."""
         said = []
         if self.first_lost is not None:
-            said.append(f"{self.lost} rows without a time left out (first: {self.rows.place(self.first_lost)})")
+            said.append(
+                f"{numbered(self.lost, 'row')} without a time left out (first: {self.rows.place(self.first_lost)})"
+            )
         if self.same and self.file.repeated_times == "first":
-            said.append(f"{self.same} rows with a repeated time left out")
+            said.append(f"{numbered(self.same, 'row')} with a repeated time left out")
         elif self.same:
-            said.append(f"{self.same} repeated times spread evenly up to the next stamp")
+            said.append(f"{numbered(self.same, 'repeated time')} spread evenly up to the next stamp")
         for begin, count in self.repeated.items():
             said.append(f"{count} rows from {self.rows.place(begin)} on repeat the file before: left out")
         return said

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compensation.arrays import Array
-from studies.errors import InputError
+from studies.errors import InputError, numbered
 from studies.files.given import shorten
 from studies.files.numbers import ROWS_AT_ONCE, parse_portions
 from studies.files.reading import ANY_SIZE, PORTION, digest, opened, read_bytes
@@ -198,7 +198,9 @@ def split_line(line: str, separator: str) -> list[str]:
 
 def _head(path: str | Path, lines: Sequence[Sequence[str]], file: FileMap) -> list[str]:
     if len(lines) < file.header_line:
-        raise InputError(f"{path}: has {len(lines)} lines, but header_line is {file.header_line} in the map.")
+        raise InputError(
+            f"{path}: has {numbered(len(lines), 'line')}, but header_line is {file.header_line} in the map."
+        )
     if file.header_line == 0:
         width = len(lines[file.data_line - 1]) if len(lines) >= file.data_line else 0
         if not width:

@@ -8,7 +8,7 @@ import numpy as np
 from compensation.arrays import Array
 from compensation.spikes import find_spikes
 from studies.calibration.observed import LEAST_ROWS, RESPONSES
-from studies.errors import InputError
+from studies.errors import InputError, numbered
 from studies.record import Record, place_in_time, with_bias
 from studies.record.one_gyro import run_apart, runs_of_one_gyro
 from studies.record.rest import LEAST_SPIKE
@@ -139,7 +139,7 @@ def _unusable(records: Sequence[Record], tables: Sequence[dict[str, Array]]) -> 
             if any(name in record.columns for record in records):
                 skipped[name] = "every value is missing"
         elif values.size < FEWEST_BINS:
-            skipped[name] = f"only {values.size} values"
+            skipped[name] = f"only {numbered(values.size, 'value')}"
         elif np.ptp(values) == 0.0:
             skipped[name] = "constant"
         elif max(spans) == 0.0:

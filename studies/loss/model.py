@@ -72,6 +72,8 @@ def loss_model(
     takes a second or two. `mode`: where it is known, at the reference temperature.
     """
     instrument = load_card(card)
+    if anchor and instrument.resonator.stem is None:
+        raise InputError(f"--anchor: the anchor loss is what a stem sends into its base, and {instrument.name} has no stem; leave it out.")  # fmt: skip
     T0, material = instrument.reference_temperature, instrument.material
     mode = mode or solve_lowest(instrument.resonator, material.elastic(T0), harmonic, theory)
     vibration = Vibration(mode.solution, mode.resonator, material, T0)

@@ -11,7 +11,7 @@ from compensation.arrays import Array
 from compensation.cross_damping import RestRun
 from compensation.decimation import average_blocks
 from compensation.spikes import find_spikes, find_stuck, find_stuck_at_ends
-from studies.errors import InputError
+from studies.errors import InputError, numbered
 from studies.record import OUTPUTS, Record
 from studies.record.one_law import course_of, follow
 
@@ -117,7 +117,7 @@ def without_stuck(record: Record) -> Record:
 
 def _stuck(record: Record) -> list[str]:
     return [
-        f"{record.path or 'record'}: {name} repeats one reading in {rows.sum()} rows, the first at {record['time_s'][rows][0]:.6g} s,"
+        f"{record.path or 'record'}: {name} repeats one reading in {numbered(int(rows.sum()), 'row')}, the first at {record['time_s'][rows][0]:.6g} s,"
         " where the readings beside them differ, as of a stuck logger or a mark for missing values: they are left out."
         for name, rows in stuck_rows(record).items()
     ]

@@ -18,7 +18,7 @@ from shell.resonator import FaceName, Resonator
 from shell.scan.alignment import RigidMotion, align
 from shell.scan.projection import Projector, check_unit
 from shell.scan.survey import Face, fewest_points, most_waves, rigid_shapes, survey, survey_map
-from studies.errors import InputError
+from studies.errors import InputError, numbered
 from studies.files.clouds import FaceGrid, Unit, read_cloud
 
 COVERAGE = 0.9
@@ -112,7 +112,7 @@ def scan_faces(
     for name, points in clouds.items():
         check_unit(points, resonator, files[name])
         if len(points) < (fewest := fewest_points(2 * max(harmonics))):
-            raise InputError(f"{files[name]}: {len(points)} points are too few for the split of n = {max(harmonics)}; {fewest} are needed.")  # fmt: skip
+            raise InputError(f"{files[name]}: {numbered(len(points), 'point')} are too few for the split of n = {max(harmonics)}; {fewest} are needed.")  # fmt: skip
         if highest > (most := most_waves(len(points))):
             raise InputError(f"--highest {highest}: {len(points)} points of {files[name]} allow up to {most}; lower it.")  # fmt: skip
     if clouds and projector is not None:

@@ -128,10 +128,11 @@ def fill_template(name: str, **values: Any) -> str:
 
 
 def typeset(text: str) -> str:
-    """Return text with a minus sign before numbers that carry a unit or begin a range, and a space before per cent."""
+    """Return text with a minus sign before numbers that carry a unit, begin a range or follow a verb, and a space before per cent."""
     unit = r"°|ppm|mHz|Hz|mK|K\b|µ|%|dB|s\b|h\b|standard|to -?\d|…|±"
     text = re.sub(r"(?<=\de)([-−+]?)0+(?=\d)", r"\1", text)
     text = re.sub(rf"(?<![\w.)\]])-(?=\d[\d.]*(?:e[-+]?\d+)? ?(?:{unit}))", "−", text)
+    text = re.sub(r"\b(is|then|not) -(?=\.?\d)", r"\1 −", text)
     return re.sub(r"(?<=\d)%", " %", re.sub(r"(?<=\de)-(?=\d)", "−", text))
 
 

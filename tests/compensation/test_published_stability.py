@@ -96,7 +96,7 @@ def test_flicker_is_read_at_its_flat_part():
     ("rate", "step", "message"),
     [
         (np.arange(8.0), 1.0, "at least 9 samples"),
-        (np.where(np.arange(20) == 3, np.nan, 1.0), 1.0, "1 missing values"),
+        (np.where(np.arange(20) == 3, np.nan, 1.0), 1.0, "has 1 missing value;"),
         (np.arange(20.0), 0.0, "step must be positive"),
         (np.full(20, 3.0), 1.0, "constant"),
     ],

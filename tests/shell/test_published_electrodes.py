@@ -189,7 +189,7 @@ def test_electrodes_that_act_along_one_axis_null_a_split_there_and_no_other(pair
     with pytest.raises(ShellError, match=r"along this axis \(0 Hz along any\)"):
         trim_voltages(eight, 1.01 * most * made / abs(made), limit)
     assert along(eight, made * np.exp(1j), limit) == 0.0
-    with pytest.raises(ShellError, match="no voltage on these electrodes .* such as 16 around"):  # it said to raise it
+    with pytest.raises(ShellError, match=r"no voltage on these electrodes .* such as 16 around"):  # it said to raise it
         trim_voltages(eight, made * np.exp(1j), limit)
 
 

@@ -50,6 +50,7 @@ def test_cells_are_escaped_sortable_and_have_minus_signs():
 
 def test_numbers_with_units_are_typeset_and_words_for_a_command_are_not():
     assert typeset("from -20 °C, 17% of the span") == "from −20 °C, 17 % of the span"
+    assert typeset("skew is then -0.2781, not -0.31 (4 times)") == "skew is then −0.2781, not −0.31 (4 times)"
     assert (
         typeset("hrg simulate card 'step 20 -10 5h' on 2026-11-22")
         == "hrg simulate card 'step 20 -10 5h' on 2026-11-22"

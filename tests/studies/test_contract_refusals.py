@@ -74,6 +74,9 @@ REFUSED = {
     "fit cross-damping RUN --quality 1e4 --calibration-temperature -300": "no gyro has this temperature",
     "fit frequency HRG --order 0": "--order 0: must be 1 to 9",
     "fit scale RUN --order 0": "--order 0: must be at least 1",
+    "show UNITS": "units.csv, line 2: a line of units, as it seems: take it out",
+    "loss free-dome --anchor": "hrg: --anchor: the anchor loss is what a stem sends into its base, and free-dome has no stem",
+    "thermal hrg-30mm 'soak 20'": "has 1 value after 'soak'",
     "loads hrg-30mm --pressure -5": "--pressure -5: must be 0 or above",
     "fit thermal": "DATA is missing. See 'hrg fit thermal --help'.",
     "fit thermal HRG --confidence 90": "--confidence 90",
@@ -193,7 +196,9 @@ def given(tmp_path_factory, pytestconfig):
         place.mkdir(parents=True, exist_ok=True)
         (place / "run.csv").write_text("time_s,housing_temperature_degC,frequency_Hz\n" + rows, encoding="utf-8")
     (folder / "row.csv").write_text("time_s,housing_temperature_degC,frequency_Hz\n0,20.0,4432.0\n", encoding="utf-8")
+    (folder / "units.csv").write_text("time_s,frequency_Hz\ns,Hz\n0,4432.0\n1,4432.0\n", encoding="utf-8")
     files = {
+        "UNITS": folder / "units.csv",
         "TYPO": folder / "typo.toml",
         **{name.upper(): folder / f"{name}.toml" for name in DESIGNS},
         "STUDY": folder / "study.toml",

@@ -98,6 +98,10 @@ def test_a_table_of_departures_must_close_the_circle(tmp_path, refuse, ask):
     write(np.arange(0, 360, 7.5))
     found = ask(["scan", "free-dome", "none", str(path), "--harmonic", "2", "--theory", "shell"])
     assert found["splits"][0]["slow_axis_deg"]["value"] == pytest.approx(np.rad2deg(0.4), abs=0.01)
+    points = path.read_text()
+    for other in (points.replace(",", "\t"), points.replace(",", ";").replace(".", ",")):
+        path.write_text(other)
+        assert ask(["scan", "free-dome", "none", str(path), "--harmonic", "2", "--theory", "shell"]) == found
     write(np.arange(0, 361, 7.5))
     assert "do not close the circle" in refuse(["scan", "free-dome", "none", path])
     write(np.arange(0, 360, 90))

@@ -178,7 +178,10 @@ def test_waves_through_the_wall_are_refused_and_large_ones_are_doubted(tmp_path,
     loaded(tmp_path, WALL.replace("0.3, sd = 0.1", "800.0, sd = 0.1"))
     assert main(["modes", str(tmp_path / "card.toml")]) == 0
     assert "differ by more than 10 % for n = 2" in capsys.readouterr().out
-    for wall in (WALL, WALL.replace("order = 4", "order = 0")):  # of a wall that is thicker all round, both are rounding
+    for wall in (
+        WALL,
+        WALL.replace("order = 4", "order = 0"),
+    ):  # of a wall that is thicker all round, both are rounding
         loaded(tmp_path, wall)
         assert main(["modes", str(tmp_path / "card.toml")]) == 0
         assert "differ by" not in capsys.readouterr().out
