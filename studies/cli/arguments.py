@@ -91,13 +91,13 @@ def open_resonator(card: str, temperature: float | None) -> "tuple[Instrument, f
         return instrument, T, *instrument.at(T)
 
 
-def ending_of(out: str, kinds: Sequence[str]) -> str:
-    """Return the ending of --out, which chooses the kind of file."""
+def ending_of(out: str, kinds: Sequence[str], option: str = "--out") -> str:
+    """Return the ending of --out or another option, which chooses the kind of file."""
     kind = Path(out).suffix.lower()
     if kind not in kinds:
-        raise InputError(f"--out {out}: the ending must be one of {', '.join(kinds)}.")
+        raise InputError(f"{option} {out}: the ending must be one of {', '.join(kinds)}.")
     if Path(out).is_dir():
-        raise InputError(f"--out {out}: is a folder; give the name of a file.")
+        raise InputError(f"{option} {out}: is a folder; give the name of a file.")
     return kind
 
 

@@ -8,7 +8,7 @@ from compensation.bell import PolynomialCurve
 from compensation.rate_law import CARRIED, SURE, RateCurve, RateLaw
 from studies.cli.arguments import COUNT, POSITIVE, Records, SaveModel
 from studies.cli.output import answers, keep_model, say
-from studies.errors import numbered
+from studies.errors import InputError, numbered
 from studies.fits.scale import ScaleStudy, study_scale
 from studies.models import source_of
 from studies.models.kinds.scale import save_scale
@@ -56,6 +56,8 @@ def fit_scale(
         order: Order of the FIR filter; the paper uses 50.
         no_filter: Omit the FIR filter; the record may then have gaps.
     """
+    if no_filter and (cutoff, order) != (1.0, 50):
+        raise InputError("--no-filter: --cutoff and --order are of the filter; leave them out, or --no-filter.")
     records, repeated = drop_repeats([read_record(path) for path in data])
     for sentence in repeated:
         say(f"warning: {sentence}")

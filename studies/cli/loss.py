@@ -78,7 +78,7 @@ def _simulated(instrument: Instrument) -> str:
     own = instrument.loss.inverse_q
     given = "the card's" if "inverse_q" in instrument.content.get("loss", {}) else "the default of"
     return (
-        f"Simulations do not use this budget: they use {given} [loss] inverse_q = {own:.3g} (Q = {1 / own:.3g}). Give a contribution"
+        f"Simulations do not use this budget: they use {given} [loss] inverse_q = {plain(own)} (Q = {plain(1 / own)}). Give a contribution"
         " in the card, such as loss.surface_layer_pm, to simulate with the budget."
     )
 

@@ -95,7 +95,9 @@ def modes(
     instrument, T, resonator, elastic = open_resonator(card, temperature)
     detailed = theory != "rayleigh"
     with naming(instrument.path):
-        found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
+        found = [
+            m for n in dict.fromkeys(harmonic) for m in solve_modes(resonator, elastic, n, count, theory, tolerance)
+        ]
         more = [_effects(m, instrument, T, tolerance) for m in found]
     share = float(law_of(instrument, T, T).uncertainty(np.array([T]))[0])
     mean = float(sum(h for _, h in resonator.thickness) / len(resonator.thickness))

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from shell.constants import zero_Celsius
 from shell.mesh import encode_animation, encode_mesh
 from shell.scene import EXAGGERATION
-from studies.cli.arguments import MANY, WHOLE, Out, Theory, ending_of
+from studies.cli.arguments import MANY, POSITIVE, WHOLE, Out, Theory, ending_of
 from studies.cli.output import answers
 from studies.errors import InputError, MissingEnvironment
 from studies.files.writing import written_whole
@@ -24,7 +24,8 @@ from studies.reports.scenes import Colour, ModeScene, ShellTemperature, read_fie
 from studies.results import Blocks, Chapter, Result, Sentence, Table, row_of
 from studies.results.page import render_result
 
-KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
+PICTURES = (".png", ".webp", ".gif")
+KINDS = (*PICTURES, ".html", ".glb", ".stl", ".ply")
 View = Literal["oblique", "axis", "side"]
 HIDDEN = Parameter(show_default=False)
 MOST = 4  # resonators in one picture
@@ -42,7 +43,7 @@ def render(
     colour: Colour = "displacement",
     field: str | None = None,
     view: View = "oblique",
-    swing_mm: float | None = None,
+    swing_mm: Annotated[float | None, POSITIVE] = None,
 ) -> Result:
     """Show a mode shape: the real solid, its nodes (red) and antinodes (black dots), the undeformed shape in grey.
 
@@ -69,9 +70,19 @@ def render(
         raise InputError("several harmonics go together only in an .html page; make one file for each.")
     if colour == "temperature" and field is None:
         raise InputError("--colour temperature needs --field FIELD.csv (position,temperature_degC along the meridian).")
+    unused = {
+        "--field": field is not None and colour != "temperature",
+        "--swing-mm": swing_mm is not None and (kind in PICTURES or kind == ".html"),
+        "--view": view != "oblique" and kind not in PICTURES,
+        "--colour": colour != "displacement" and kind in (".html", ".stl"),
+    }
+    if named := ", ".join(option for option, idle in unused.items() if idle):
+        raise InputError(
+            f"{named}: without effect on {out} as it is asked for; leave it out, or see 'hrg render --help'."
+        )
     along = read_field(field) if field is not None else None
     shown = _solve(card, harmonic, index, temperature, theory, kind)
-    if kind in (".png", ".webp", ".gif"):
+    if kind in PICTURES:
         data = _picture(shown, kind, colour, along, view)
     elif kind == ".html":
         data = _page(shown)
@@ -99,7 +110,7 @@ def _solve(
     if not cards:
         raise InputError("a card is missing: give its path or the name of a built-in one ('hrg cards').")
     count = len(cards) * max(len(temperatures), 1)
-    most = MOST if kind in (".png", ".webp", ".gif") else 1
+    most = MOST if kind in PICTURES else 1
     if count > most:
         raise InputError(f"{count} resonators are too many for one {kind} file, which shows {most} at most.")
     wanted: list[float | None] = [*(T + zero_Celsius for T in temperatures)] or [None]

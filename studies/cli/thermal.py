@@ -83,7 +83,7 @@ def thermal(
                 [Column("0", "constant", spell=name_constant), "1: d ln τ / d ln p +.3f"]),
             Figure(lambda: _curves(transient, chamber, weights, names), "Temperatures in time."),
             Table("Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
-                rows_of(housed | temperatures), ["time_s: time (s) .0f | chamber_temperature_degC: chamber .3f", *(f"{name}: {name} .3f" for name in names)],
+                rows_of(housed | temperatures), [f"time_s: time (s) .{0 if time[1] - time[0] >= 10 else 1}f | chamber_temperature_degC: chamber .3f", *(f"{name}: {name} .3f" for name in names)],
                 "Shell: mean temperature." + f" The heat balance closes within {energy.error:.0e} of the heat exchanged." * (energy.turnover > 0)),
         ],
     )  # fmt: skip

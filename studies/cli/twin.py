@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from studies.cli.arguments import Card, Theory
+from studies.cli.arguments import Card, Theory, ending_of
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.writing import check_folder, write_text
@@ -45,6 +45,8 @@ def twin(
         fmi: Version of the FMU.
         boundary: Input temperature: that of the chamber, or of the housing itself, ahead of its sensor. Without its slope it is held over a step.
     """
+    if fmu is not None:
+        ending_of(fmu, (".fmu",), "--fmu")
     if fmu is None and c is None:
         raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")
     plan = plan_twin(load_card(card), boundary, theory)

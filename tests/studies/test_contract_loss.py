@@ -91,7 +91,7 @@ def test_every_key_of_the_card_makes_its_part(ask, write, say):
 
 def test_it_is_said_which_q_a_simulation_takes(write, say):
     """A budget of 2e7 once stood beside a simulation of 1e7 without a word."""
-    assert "they use the default of [loss] inverse_q = 1e-07 (Q = 1e+07)" in say(write())
+    assert "they use the default of [loss] inverse_q = 1.00e-7 (Q = 1.00e7)" in say(write())
     assert "Simulations take 1/Q from this budget." in say(write(loss={"film": [GOLD]}))
 
 
