@@ -20,10 +20,9 @@ from studies.instrument.card import Instrument
 from studies.planning.chamber import Chamber, limited
 from studies.planning.expectation import Chances, Expectation, Hidden, Key, hide
 from studies.record import Record
-from studies.resonator.law import law_of
 from studies.simulation.drive import drive_by_schedule
 from studies.simulation.noise import bias_noise, frequency_noise
-from studies.simulation.prediction import MARGIN
+from studies.simulation.prediction import law_about
 
 SNRS, SURE, OFTEN, SMALLER = (1.0, 0.3, 0.1), 0.9, 0.05, 0.5
 """Where chances are shown; chance from which on an effect is identified; share from which on another answer is listed, and the part of
@@ -202,8 +201,7 @@ def simulate_plan(card: Instrument, profiles: Sequence[str]) -> list[Record]:
     from studies.simulation.virtual_gyro import simulate_run
 
     schedules = [load_schedule(words) for words in profiles]
-    reached = np.concatenate([[card.reference_temperature], *(profile.value for profile, _ in schedules)])
-    law = law_of(card, float(reached.min()) - MARGIN, float(reached.max()) + MARGIN)
+    law = law_about(card, np.concatenate([profile.value for profile, _ in schedules]))
     runs = [
         simulate_run(
             card,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from shell.layout import Theory
     from studies.instrument.card import Instrument
 
-MARGIN = 10.0  # K beyond the boundary in which the frequency stays known: the drive's own heat
+MARGIN = 10.0  # K beyond the boundary in which the frequency stays known
 SHIFT_STEP = 0.02  # s
 
 
@@ -108,10 +108,17 @@ def predict(
 def law_for(
     instrument: "Instrument", drive: Drive, margin: float = MARGIN, theory: "Theory" = "solid"
 ) -> "FrequencyLaw":
-    """Build the frequency law over the temperatures of a drive and the reference; over all that the material allows for effects on it."""
-    if any(find_effect(one.name).thermal for one in instrument.effects):
+    """Build the frequency law over the temperatures of a drive and the reference."""
+    return law_about(instrument, drive.profile.value, margin, theory)
+
+
+def law_about(
+    instrument: "Instrument", imposed: "Array", margin: float = MARGIN, theory: "Theory" = "solid"
+) -> "FrequencyLaw":
+    """Build it over imposed temperatures (K); over all that the material allows where a power or effects warm the resonator."""
+    if instrument.keys("thermal").drive_power_mW or any(find_effect(one.name).thermal for one in instrument.effects):
         return law_of(instrument, theory=theory)
-    reached = np.append(drive.profile.value, instrument.reference_temperature)
+    reached = np.append(imposed, instrument.reference_temperature)
     return law_of(instrument, float(reached.min()) - margin, float(reached.max()) + margin, theory)
 
 

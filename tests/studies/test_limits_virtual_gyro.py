@@ -220,6 +220,9 @@ def test_drive_power_warms_the_shell(card):
     assert len(heated.sources) == 24
     assert sum(source.power for source in heated.sources) == pytest.approx(1e-3)
     assert slowest_lag(build_network(card), 293.15) < resistance.time_constants[0] * 1.01
+    hot = card.with_table("thermal", {"drive_power_mW": 20.0})
+    made = simulate_run(hot, load_profile("soak 20 1h"), 1 / 600, noise=False, theory="shell")
+    assert made.record["resonator_temperature_degC"].min() > 31.0  # its frequency was known up to 30 °C only
 
 
 def test_the_heat_path_follows_geometry_material_and_table(card):
