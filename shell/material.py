@@ -236,8 +236,14 @@ def constant_material(name: str, youngs_modulus: float, poisson_ratio: float, de
     return Material(name, "given values", 0.0, 5000.0, properties, "given in the card", constant=open_ones)
 
 
-def check_sign(where: str, name: str, found: Property, span: list[float]) -> None:
-    """Refuse a property that has not the sign, or the size, of one anywhere in its range (°C)."""
+def check_sign(
+    where: str,
+    name: str,
+    found: Property,
+    span: list[float],
+    sizes: Mapping[str, tuple[float, float, str]] | None = None,
+) -> None:
+    """Refuse a property that has not the sign, or the size (least, most, unit), of one anywhere in its range (°C)."""
     if found.form == "table" and not any(found.deviation):  # shape-preserving: its extremes are among its points
         values = found.numbers.get("value", 1.0) * np.asarray(found.numbers["values"], dtype=float)
     else:
@@ -247,8 +253,10 @@ def check_sign(where: str, name: str, found: Property, span: list[float]) -> Non
         raise ShellError(f"{where}: leaves the range -1 to 0.5 within range_degC.")
     if name == "expansion" and not (np.abs(values) < 0.01).all():
         raise ShellError(f"{where}: no solid expands by 1 % per kelvin; give it in 1/K.")
-    if name not in ("poisson_ratio", "expansion") and not ((values > 1e-30) & (values < 1e30)).all():
-        raise ShellError(f"{where}: must be positive, and of a size in SI units, everywhere within range_degC.")
+    if name not in ("poisson_ratio", "expansion"):
+        least, most, unit = (sizes or {}).get(name, (1e-30, 1e30, "in SI units"))
+        if not ((values > least) & (values < most)).all():
+            raise ShellError(f"{where}: must be {least:g} to {most:g} {unit} everywhere within range_degC.")
 
 
 def spell(names: Sequence[str]) -> str:

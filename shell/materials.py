@@ -15,6 +15,14 @@ from shell.errors import ShellError, nearest
 from shell.material import ELASTIC, Material, check_sign
 from shell.property import FORMS, LISTS, PROPERTIES, SIGNED, Property, coefficient_names
 
+SOLID = {
+    "youngs_modulus": (1e6, 1e13, "Pa"),
+    "shear_modulus": (1e6, 1e13, "Pa"),
+    "density": (50.0, 3e4, "kg/m³"),
+    "conductivity": (1e-3, 1e4, "W/(m K)"),
+    "heat_capacity": (1.0, 1e5, "J/(kg K)"),
+}
+"""Sizes of any solid: beyond them a number of a file is in another unit."""
 CHECKABLE = (*PROPERTIES, "elastic_constants", "temperature_coefficients")
 _SHIPPED = Path(__file__).with_name("materials.toml")
 
@@ -158,7 +166,7 @@ def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Prop
         raise ShellError(f"{where}: uncertainties must be numbers, zero or more.")
     a, b, c = (float(unsettled.get(one, 0.0)) for one in coefficients)
     result = Property(entry["form"], numbers, uncertainty, str(entry.get("source", "")), name not in SIGNED, (a, b, c))
-    check_sign(where, name, result, span)
+    check_sign(where, name, result, span, SOLID)
     return result
 
 

@@ -103,7 +103,9 @@ BROKEN = [
     (LAW + 'youngs_modulus={form="table",temperature_degC=3,values=[1,2]}', ["temperature_degC", "list"]),
     (LAW + 'youngs_modulus={form="constant",value=[1,2]}', ["value", "number"]),
     (LAW + 'youngs_modulus={form=["constant"],value=1}', ["form"]),
-    (LAW + 'youngs_modulus={form="constant",value=1e300}', ["positive"]),
+    (LAW + 'youngs_modulus={form="constant",value=1e300}', ["1e+06 to 1e+13 Pa"]),
+    (LAW + 'youngs_modulus={form="constant",value=190}', ["1e+06 to 1e+13 Pa"]),
+    (LAW + 'density={form="constant",value=8.0,at_degC=5}', ["50 to 30000 kg/m³"]),
     (LAW + 'youngs_modulus={form="parabola",value=1,at_degC=5,rise=0.1,maximum_degC=5}', ["maximum_degC", "differ"]),
     (LAW + 'youngs_modulus={form="table",temperature_degC=[0,9],values=[1,2],uncertainty={values=1}}', ["[x.laws.a.youngs_modulus.uncertainty]", "values"]),
 ]  # fmt: skip
