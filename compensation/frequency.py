@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
+from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.polynomial import PolynomialFit, count_apart, fit_polynomial
 from compensation.regression import FTest, LinearFit, compare_nested
 
-FARTHEST_REFERENCE = 1e4  # °C
+FARTHEST_REFERENCE = 1e4  # °C, and absolute zero
 GRID = 2001  # temperatures at which a curve is looked at
 
 
@@ -158,7 +159,7 @@ def fit_frequency(
         raise CompensationError(words) from None
     if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
         raise CompensationError(f"the resolution of the readings must be positive, not {resolution:g} Hz.")
-    if not abs(reference_temperature_degC) <= FARTHEST_REFERENCE:
+    if not -zero_Celsius <= reference_temperature_degC <= FARTHEST_REFERENCE:
         raise CompensationError(f"a reference temperature of {reference_temperature_degC:g} °C is impossible; take one near those measured.")  # fmt: skip
     if resolution is not None and f.size and not np.finfo(float).eps * np.max(f) <= resolution < np.max(f):
         raise CompensationError(f"readings of up to {np.max(f):g} Hz cannot have a resolution of {resolution:g} Hz.")

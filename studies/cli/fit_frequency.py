@@ -31,7 +31,7 @@ def fit_frequency(
     *more: str,
     order: Annotated[int, ORDER] = 3,
     reference_temperature: float = 0.0,
-    resolution: float | None = None,
+    resolution: Annotated[float | None, POSITIVE] = None,
     save: SaveModel = None,
     time_constant: Annotated[float, POSITIVE] = 3000.0,
     left: Annotated[float, POSITIVE] = 0.05,

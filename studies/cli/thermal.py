@@ -30,7 +30,7 @@ ONE_LUMP = (
 
 @answers("hrg.thermal/1")
 def thermal(
-    card: Card, profile: Course, *, rows: Annotated[int, numbers(lambda one: one > 1, "at least 2")] = 13
+    card: Card, profile: Course, *, rows: Annotated[int, numbers(lambda one: 2 <= one <= 10_000, "2 to 10000")] = 13
 ) -> Result:
     """Show time constants, their sensitivities, and the temperatures of housing, base, stem and shell in time.
 
