@@ -29,7 +29,6 @@ FLICKER_TIMES = np.asarray(60.0 * 4.0 ** np.arange(-11, 7), dtype=np.float64)  #
 SLOW_TIMES = 7
 """How many of them are a minute and longer: flicker noise of a = 1 has this variance in rows of some seconds to minutes."""
 FORGOTTEN = 40.0  # correlation times after which nothing is left to double precision
-STEP = 1e-4  # in the ln of a correlation time, for slopes
 BRIEF = 50.0  # correlation times in a span beyond which a row remembers its neighbours only
 
 
@@ -87,19 +86,23 @@ class Noise:
 
 def gauss_markov(times: Array, spans: ArrayLike, tau: float) -> Array:
     """Return the covariance of rows of a Gauss–Markov process of correlation time τ (s) and variance 1."""
+    return gauss_markov_and_slope(times, spans, tau, sloped=False)[0]
+
+
+def gauss_markov_and_slope(times: Array, spans: ArrayLike, tau: float, sloped: bool = True) -> tuple[Array, Array]:
+    """Return that covariance and, where it is asked for, its slope by ln τ, by which x = Δ/τ moves as −x: g as g − e⁻ˣ, the variance v as 2 (v − g)."""
     spans = np.broadcast_to(np.asarray(spans, dtype=np.float64), times.shape)
     near = spans / tau
-    apart = np.abs(times[:, None] - times[None, :]) - 0.5 * (spans[:, None] + spans[None, :])
-    g = _mean_of_decay(near)
-    out = np.exp(-np.maximum(apart, 0.0) / tau) * np.outer(g, g)
-    out[np.diag_indices_from(out)] = variance_of_mean(near)
-    return np.asarray(out)
-
-
-def gauss_markov_slope(times: Array, spans: ArrayLike, tau: float) -> Array:
-    """Return the slope of that covariance by ln τ, by central differences."""
-    shorter, longer = (gauss_markov(times, spans, tau * math.exp(way * STEP)) for way in (-1, 1))
-    return (longer - shorter) / (2 * STEP)
+    apart = np.maximum(np.abs(times[:, None] - times) - 0.5 * (spans[:, None] + spans), 0.0) / tau
+    g, variance, diagonal = _mean_of_decay(near), variance_of_mean(near), slice(None, None, len(times) + 1)
+    out = np.exp(-apart) * (g[:, None] * g)
+    slope = np.zeros((0, 0))
+    if sloped:
+        grown = 1.0 - np.exp(-near) / g
+        slope = out * (apart + grown[:, None] + grown)
+        slope.reshape(-1)[diagonal] = 2.0 * (variance - g)
+    out.reshape(-1)[diagonal] = variance
+    return out, slope
 
 
 def flicker(times: Array, spans: ArrayLike) -> Array:

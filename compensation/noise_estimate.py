@@ -1,7 +1,9 @@
 """Levels of noise by restricted likelihood with a weak prior (`compensation.noise_rows`): Newton's steps from several starts."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -130,8 +132,34 @@ class _Levels:
         """Return −2 ln L of the rows and of what is within them, with slopes and curvature by ln of every kind."""
         seen = [self.rows.deviance(self.rest, self.columns, self.precision, noise, self.mean)]
         seen += [one.deviance(noise) for one in self.inner]
-        value, slopes, curvature = (np.sum(own, axis=0) for own in zip(*seen, strict=True))
+        value, slopes, curvature = (sum(own[1:], own[0]) for own in zip(*seen, strict=True))
         return float(value), slopes, curvature
+
+    @cached_property
+    def _places(self) -> Sequence[int]:
+        """Which of `UNKNOWNS` the levels are."""
+        return [0, *(UNKNOWNS.index(kind) for kind in self.free)]
+
+    @cached_property
+    def _along(self) -> Array:
+        """Slopes of ln of every level by the unknowns: slow levels are over the white one."""
+        along = np.eye(len(self._places))
+        along[:, 0] = [kind != "markov_time" for kind in ("white", *self.free)]
+        return along
+
+    @cached_property
+    def _ways(self) -> Array:
+        """Slopes of the surprises of the slow levels by the unknowns."""
+        stated = [self.stated is not None and getattr(self.stated, kind) > 0 for kind in self._slow]
+        ways = [
+            self._along[k] / STATED_SPREAD if s else np.eye(len(self._places))[k] / SPREAD
+            for k, s in enumerate(stated, 1)
+        ]
+        return np.array(ways).reshape(len(stated), len(self._places))
+
+    @cached_property
+    def _slow(self) -> Sequence[str]:
+        return [kind for kind in self.free if kind in KINDS]
 
     def __call__(self, x: Array) -> Seen:
         noise = self.noise(x)
@@ -139,15 +167,12 @@ class _Levels:
             total, slopes, curvature = self.likelihood(noise)
         except np.linalg.LinAlgError:  # levels so far apart that rounding decides
             return np.inf, x, np.eye(len(x))
-        places = [0, *(UNKNOWNS.index(kind) for kind in self.free)]
-        along = np.eye(len(places))
-        along[:, 0] = [kind != "markov_time" for kind in ("white", *self.free)]  # slow levels are over the white one
-        bend = curvature[np.ix_(places, places)] + np.diag(2 * np.maximum(slopes[places], 0.0))  # Σ goes with θ²
-        slope, bend = slopes[places] @ along, along.T @ bend @ along
-        levels = [kind for kind in self.free if kind in KINDS]
-        for k, (surprise, spread, absolute) in enumerate(_surprises(self.rows, noise, levels, self.stated), 1):
-            way = (along if absolute else np.eye(len(x)))[k] / spread
-            total, slope, bend = total + surprise**2, slope + 2 * surprise * way, bend + 2 * np.outer(way, way)
+        slope = slopes[self._places]
+        bend = curvature[self._places][:, self._places] + np.diag(2 * np.maximum(slope, 0.0))  # Σ goes with θ²
+        surprise, ways = np.array(_surprises(self.rows, noise, self._slow, self.stated)), self._ways
+        slope = slope @ self._along + 2 * surprise @ ways
+        bend = self._along.T @ bend @ self._along + 2 * ways.T @ ways
+        total += float(surprise @ surprise)
         return total + 2.0 * price_of(noise, self.stated), slope, bend
 
 
@@ -158,7 +183,7 @@ def _newton(objective: _Levels, x: Array, seen: Seen, below: float = np.inf) -> 
     for _ in range(MOST_STEPS):
         free = ~(((x <= low) & (slope > 0)) | ((x >= high) & (slope < 0)))
         step = np.zeros_like(x)
-        step[free] = -np.linalg.solve(bend[np.ix_(free, free)] + 1e-9 * np.eye(free.sum()), slope[free])
+        step[free] = -np.linalg.solve(bend[free][:, free] + 1e-9 * np.eye(free.sum()), slope[free])
         step *= min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
         promised = -(slope @ step + 0.5 * step @ bend @ step)
         if promised < CLOSE or value - HOPE * promised > below:
@@ -200,8 +225,7 @@ def _slow_rms(x: Array) -> float:
 def log_prior(rows: NoiseRows, noise: Noise, stated: Noise | None = None) -> float:
     """Return the log of the weak prior of the slow levels that are there."""
     free = [kind for kind in KINDS[1:] if getattr(noise, kind) > 0]
-    surprises = _surprises(rows, noise, free, stated)
-    return -0.5 * sum(surprise**2 for surprise, _, _ in surprises) - price_of(noise, stated)
+    return -0.5 * sum(surprise**2 for surprise in _surprises(rows, noise, free, stated)) - price_of(noise, stated)
 
 
 def price_of(noise: Noise, stated: Noise | None) -> float:
@@ -209,15 +233,11 @@ def price_of(noise: Noise, stated: Noise | None) -> float:
     return PRICE if noise.markov and not (stated is not None and stated.markov) else 0.0
 
 
-def _surprises(
-    rows: NoiseRows, noise: Noise, kinds: Sequence[str], stated: Noise | None
-) -> list[tuple[float, float, bool]]:
-    """Return by how many standard deviations each level departs from its prior, that deviation, and whether it is that of a stated level."""
+def _surprises(rows: NoiseRows, noise: Noise, kinds: Sequence[str], stated: Noise | None) -> list[float]:
+    """Return by how many standard deviations each level departs from its prior: about one that is stated, or about the white noise."""
     white, unit, found = noise.white / float(np.sqrt(rows.span)), rows.slow_units, []
     for kind in kinds:
         level, said = getattr(noise, kind), 0.0 if stated is None else getattr(stated, kind)
-        if said > 0:
-            found.append((float(np.log(level / said)) / STATED_SPREAD, STATED_SPREAD, True))
-        else:
-            found.append(((float(np.log(level / unit[kind] / white)) - USUAL) / SPREAD, SPREAD, False))
+        usual, spread = (math.log(said), STATED_SPREAD) if said > 0 else (math.log(unit[kind] * white) + USUAL, SPREAD)
+        found.append((math.log(level) - usual) / spread)
     return found

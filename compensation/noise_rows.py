@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
-from compensation.noise import SLOW_TIMES, Noise, flicker, gauss_markov, gauss_markov_slope, random_walk
+from compensation.noise import SLOW_TIMES, Noise, flicker, gauss_markov, gauss_markov_and_slope, random_walk
 
 KEPT = 4  # roots of the covariance of rows
 COARSE = 150  # most rows of a run from which noise is estimated in a model with many unknowns
@@ -138,7 +138,7 @@ class NoiseRows:
         total: Array = noise.flicker**2 * F + noise.walk**2 * W + noise.offset**2
         if noise.markov:
             total += noise.markov**2 * gauss_markov(self.times[run], self.spans[run], noise.markov_time)
-        np.einsum("ii->i", total)[:] += noise.white**2 * self.stretch[run] / self.spans[run]
+        total.reshape(-1)[:: len(total) + 1] += noise.white**2 * self.stretch[run] / self.spans[run]
         return total
 
     def variances(self, noise: Noise) -> Array:
@@ -202,25 +202,27 @@ class NoiseRows:
         for (K, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
             S = len(runs) * scipy.linalg.lapack.dlauum(K, lower=1)[0]  # of V⁻¹ − v vᵀ the lower half
             wide = self.stretch[runs[0]] / self.spans[runs[0]]
-            M, turned = self._correlated(runs[0], noise)
+            correlated = self._correlated(runs[0], noise)
+            theirs = levels[: 4 + len(correlated)]
             for run in runs:
                 U = multiply_lower(K, both[self.slices[run]], transposed=True)
                 S = scipy.linalg.blas.dsyrk(-1.0, U, beta=1.0, c=S, lower=1)
                 v = U[:, -1]
-                own = np.column_stack([wide * v, F @ v, W @ v, np.full(len(v), v.sum()), M @ v, turned @ v])
-                moved[self.slices[run]] = multiply_lower(K, own * levels)
+                own = np.empty((len(v), len(theirs)), order="F")
+                for k, column in enumerate((wide * v, F @ v, W @ v, v.sum(), *(M @ v for M in correlated))):
+                    own[:, k] = column
+                moved[self.slices[run], : len(theirs)] = multiply_lower(K, own * theirs)
             diagonal = S.diagonal()
-            f, w, m, t = (2 * np.vdot(S, own) - diagonal @ own.diagonal() for own in (F, W, M, turned))
-            slopes += levels * np.array([diagonal @ wide, f, w, 2 * S.sum() - diagonal.sum(), m, t])
+            # Sᵀ as it lies in memory: the covariances are symmetric
+            f, w, *m = (2 * np.vdot(S.T, own) - diagonal @ own.diagonal() for own in (F, W, *correlated))
+            slopes[: len(theirs)] += theirs * np.array([diagonal @ wide, f, w, 2 * S.sum() - diagonal.sum(), *m])
         told = beside.T @ moved
         return total, slopes, moved.T @ moved - told.T @ told
 
-    def _correlated(self, run: int, noise: Noise) -> tuple[Array, Array]:
-        """Covariance of the rows of a run by correlated noise of rms 1, and its slope by ln of its time."""
-        if not noise.markov:
-            return (np.zeros((len(self.times[run]), len(self.times[run]))),) * 2
+    def _correlated(self, run: int, noise: Noise) -> tuple[Array, ...]:
+        """Covariance of the rows of a run by correlated noise of rms 1, and its slope by ln of its time; none without such noise."""
         own = self.times[run], self.spans[run], noise.markov_time
-        return gauss_markov(*own), gauss_markov_slope(*own)
+        return gauss_markov_and_slope(*own) if noise.markov else ()
 
 
 def level_slopes(noise: Noise) -> Array:

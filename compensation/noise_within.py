@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from compensation.arrays import Array
-from compensation.noise import Noise, flicker, gauss_markov, gauss_markov_slope, random_walk
+from compensation.noise import Noise, flicker, gauss_markov_and_slope, random_walk
 from compensation.noise_rows import KINDS, NoiseRows, level_slopes
 
 EVEN = 1e-3
@@ -83,7 +83,7 @@ def _correlated(k: int, span: float, tau: float) -> Array:
     if not tau:
         return np.zeros((2, k - 1, k - 1))
     Q, rows = _contrasts(k), (*_even(k, span), tau)
-    return np.array([Q.T @ own(*rows) @ Q for own in (gauss_markov, gauss_markov_slope)])
+    return np.array([Q.T @ own @ Q for own in gauss_markov_and_slope(*rows)])
 
 
 def _contrasts(k: int) -> Array:
