@@ -25,10 +25,10 @@ from studies.reports.digits import to_numerical_error
 from studies.reports.scenes import THEORIES, live_chapter, show_mode, view_blocks
 from studies.resonator.law import law_of
 from studies.results import Column, Result, Sentence, Table, Where, row_of
-from studies.results.page import Block
 
 if TYPE_CHECKING:
     from shell.imperfection import Split
+    from studies.results.page import Block
 
 Entry = dict[str, Any]
 
@@ -220,7 +220,7 @@ def _effect_tables(modes: list[Entry]) -> list[Table]:
     ]
 
 
-def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> list[Block]:
+def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> "list[Block]":
     drawn: Literal["solid", "shell"] = "solid" if theory == "solid" else "shell"
     words = " Rayleigh's closed form gives the frequencies of the table, not these shapes." * (theory == "rayleigh")
     return view_blocks([show_mode(instrument, n, temperature=T, theory=drawn) for n in harmonics], words)
