@@ -197,7 +197,7 @@ def describe_environment_error(error: BaseException) -> str:
     return f"{named}the system refuses ({error.strerror or error}); check permissions, path and disk space."
 
 
-DEFERRED = ("numpy.ctypeslib", "numpy.f2py", "numpy.ma", "numpy.testing", "pydoc")
+DEFERRED = ("numpy.f2py", "numpy.testing", "pydoc")
 
 
 class _Deferred:
