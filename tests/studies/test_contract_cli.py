@@ -5,12 +5,14 @@ import os
 import subprocess
 import sys
 from importlib.metadata import version
+from importlib.util import module_from_spec
 from pathlib import Path
 from random import Random
 
 import pytest
+import scipy
 
-from studies.cli import COMMANDS, main
+from studies.cli import COMMANDS, _Deferred, main
 
 ROOT = Path(__file__).parents[2]
 PARTS = [
@@ -59,6 +61,18 @@ for words in ("simulate free-dome run.csv --out out.csv", "calibrate free-dome r
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     subprocess.run([sys.executable, "-c", code], capture_output=True, cwd=tmp_path, env=environment, timeout=600)
     assert (tmp_path / "loaded").read_text().splitlines() == ["cards []", "commands []", "modes []", *["0 []"] * 3]
+
+
+def test_what_scipy_says_of_its_functions_is_not_read_at_the_start_of_a_command():
+    """SciPy edits that of hundreds of functions as it loads; what is edited here is empty, and in its form."""
+    spec = _Deferred.find_spec("scipy._lib._docscrape", scipy._lib.__path__)
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    made = module.FunctionDoc(scipy.optimize.nnls)
+    assert made["Parameters"] == []
+    made["Notes"].append("edited")
+    assert str(made).split("\n", 1)[1].split()[-1] == "edited"
+    assert _Deferred.find_spec("scipy._lib._util", scipy._lib.__path__) is None
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
