@@ -136,30 +136,14 @@ class _Levels:
         return float(value), slopes, curvature
 
     @cached_property
-    def _places(self) -> Sequence[int]:
-        """Which of `UNKNOWNS` the levels are."""
-        return [0, *(UNKNOWNS.index(kind) for kind in self.free)]
-
-    @cached_property
-    def _along(self) -> Array:
-        """Slopes of ln of every level by the unknowns: slow levels are over the white one."""
-        along = np.eye(len(self._places))
-        along[:, 0] = [kind != "markov_time" for kind in ("white", *self.free)]
-        return along
-
-    @cached_property
-    def _ways(self) -> Array:
-        """Slopes of the surprises of the slow levels by the unknowns."""
-        stated = [self.stated is not None and getattr(self.stated, kind) > 0 for kind in self._slow]
-        ways = [
-            self._along[k] / STATED_SPREAD if s else np.eye(len(self._places))[k] / SPREAD
-            for k, s in enumerate(stated, 1)
-        ]
-        return np.array(ways).reshape(len(stated), len(self._places))
-
-    @cached_property
-    def _slow(self) -> Sequence[str]:
-        return [kind for kind in self.free if kind in KINDS]
+    def _ways(self) -> tuple[list[int], Array, list[str], Array]:
+        """Which of `UNKNOWNS` the levels are, and their slopes by these: slow levels are over the white one; the slow kinds, and the slopes of their surprises."""
+        one, slow = np.eye(1 + len(self.free)), [kind for kind in self.free if kind in KINDS]
+        along = np.column_stack([[kind != "markov_time" for kind in ("white", *self.free)], one[:, 1:]])
+        said = [self.stated is not None and getattr(self.stated, kind) > 0 for kind in slow]
+        ways = [along[k] / STATED_SPREAD if stated else one[k] / SPREAD for k, stated in enumerate(said, 1)]
+        places = [0, *(UNKNOWNS.index(kind) for kind in self.free)]
+        return places, along, slow, np.reshape(ways, (len(slow), len(one)))
 
     def __call__(self, x: Array) -> Seen:
         noise = self.noise(x)
@@ -167,11 +151,12 @@ class _Levels:
             total, slopes, curvature = self.likelihood(noise)
         except np.linalg.LinAlgError:  # levels so far apart that rounding decides
             return np.inf, x, np.eye(len(x))
-        slope = slopes[self._places]
-        bend = curvature[self._places][:, self._places] + np.diag(2 * np.maximum(slope, 0.0))  # Σ goes with θ²
-        surprise, ways = np.array(_surprises(self.rows, noise, self._slow, self.stated)), self._ways
-        slope = slope @ self._along + 2 * surprise @ ways
-        bend = self._along.T @ bend @ self._along + 2 * ways.T @ ways
+        places, along, slow, ways = self._ways
+        slope = slopes[places]
+        bend = curvature[places][:, places] + np.diag(2 * np.maximum(slope, 0.0))  # Σ goes with θ²
+        surprise = np.array(_surprises(self.rows, noise, slow, self.stated))
+        slope = slope @ along + 2 * surprise @ ways
+        bend = along.T @ bend @ along + 2 * ways.T @ ways
         total += float(surprise @ surprise)
         return total + 2.0 * price_of(noise, self.stated), slope, bend
 

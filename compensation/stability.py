@@ -134,40 +134,27 @@ def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
     if allan.tau.size < 5:
         raise CompensationError(f"fitting N, B and K needs five values of τ or more, not {allan.tau.size}; record longer.")  # fmt: skip
     found = _fit(allan, UNITS)
-    if found.misfit > MISSED:
+    if found[0] > MISSED:
         times = 2.0 ** np.arange(np.log2(allan.tau[0]), np.log2(allan.tau[-1]), 1 / PER_OCTAVE)
-        more = min((_fit(allan, (*UNITS, Noise(markov=1.0, markov_time=T))) for T in times.tolist()), key=lambda one: one.misfit)  # fmt: skip
-        found = more if more.misfit < MISSED else found
-    return found.with_errors(allan)
+        more = min((_fit(allan, (*UNITS, Noise(markov=1.0, markov_time=T))) for T in times.tolist()), key=lambda one: one[0])  # fmt: skip
+        found = more if more[0] < MISSED else found
+    misfit, c, weighted, time = found
+    Q, R = np.linalg.qr(weighted)
+    root = np.linalg.solve(R, Q.T)
+    errors = max(1.0, misfit) * np.sqrt(np.diag(root @ _correlation(allan, c, time) @ root.T))
+    values = np.sqrt(c)
+    # u(√c) = u(c) / (2 √c); where that linearisation fails, √u(c) bounds what may be hidden.
+    uncertainties = np.minimum(errors / np.maximum(2 * values, 1e-150), np.sqrt(errors))
+    markov = float(values[3]) if time else 0.0
+    N, B, K = values[:3].tolist()
+    N_uncertainty, B_uncertainty, K_uncertainty = uncertainties[:3].tolist()
+    return NoiseCoefficients(
+        N, B, K, N_uncertainty, B_uncertainty, K_uncertainty, misfit, markov, time if markov else 0.0
+    )
 
 
-@dataclass(frozen=True)
-class _Fitted:
-    """Squared levels c of noises by non-negative least squares, the weighted columns of their curves, and what these miss of the curve over its errors."""
-
-    c: Array
-    weighted: Array
-    misfit: float
-    time: float
-
-    def with_errors(self, allan: AllanDeviation) -> NoiseCoefficients:
-        """The levels with their errors, which know shared samples."""
-        Q, R = np.linalg.qr(self.weighted)
-        root = np.linalg.solve(R, Q.T)
-        covariance = root @ _correlation(allan, self.c, self.time) @ root.T
-        errors, values = max(1.0, self.misfit) * np.sqrt(np.diag(covariance)), np.sqrt(self.c)
-        # u(√c) = u(c) / (2 √c); where that linearisation fails, √u(c) bounds what may be hidden.
-        uncertainties = np.minimum(errors / np.maximum(2 * values, 1e-150), np.sqrt(errors))
-        markov = float(values[3]) if self.time else 0.0
-        N, B, K = values[:3].tolist()
-        N_uncertainty, B_uncertainty, K_uncertainty = uncertainties[:3].tolist()
-        return NoiseCoefficients(
-            N, B, K, N_uncertainty, B_uncertainty, K_uncertainty, self.misfit, markov, self.time if markov else 0.0
-        )
-
-
-def _fit(allan: AllanDeviation, units: Sequence[Noise]) -> _Fitted:
-    """Fit levels of noises by non-negative least squares on σ²/σ²_fit, weights EDF/2."""
+def _fit(allan: AllanDeviation, units: Sequence[Noise]) -> tuple[float, Array, Array, float]:
+    """Fit squared levels c of noises by non-negative least squares on σ²/σ²_fit, weights EDF/2; first the misfit, then c, the weighted columns and the correlation time."""
     A, variance = np.stack([one.allan_variance(allan.tau) for one in units], axis=-1), allan.deviation**2
     fitted, c = variance, np.zeros(len(units))
     for _ in range(50):
@@ -179,7 +166,7 @@ def _fit(allan: AllanDeviation, units: Sequence[Noise]) -> _Fitted:
         if settled:
             break
     deviates = (variance / fitted - 1) * np.sqrt(allan.degrees_of_freedom / 2)
-    return _Fitted(c, A * weight[:, None], float(np.sqrt(np.mean(deviates**2))), units[-1].markov_time)
+    return float(np.sqrt(np.mean(deviates**2))), c, A * weight[:, None], units[-1].markov_time
 
 
 def _correlation(allan: AllanDeviation, c: Array, time: float) -> Array:
