@@ -42,7 +42,7 @@ def legendre(degree: int, points: Array) -> Basis:
 
 
 def _polynomials(degree: int, points: Array) -> Array:
-    """k P_k = (2k - 1) x P_(k-1) - (k - 1) P_(k-2), k = 0 ... degree in columns; called thousands of times, and numpy's own looks at axes first."""
+    """P_0 ... P_degree in columns, k P_k = (2k - 1) x P_(k-1) - (k - 1) P_(k-2); called thousands of times, and numpy's own looks at axes first."""
     p = np.ones((degree + 1, len(points)))
     p[1:2] = points
     for k in range(2, degree + 1):
