@@ -8,7 +8,7 @@ from studies.effects.states import States, lag
 
 
 def columns(states: States, shape: Shape, response: str) -> Array:
-    """T_r = (1 − w) behind(T_h) + w lag(T_h; τ₂): the change for w = 1, and for paths at a third and at three times of τ₂."""
+    """T_r = (1 − w) Σ wᵢ lag(T_h; τᵢ) + w lag(T_h; τ₂): the change for w = 1, and for paths at a third and at three times of τ₂."""
     first = states.behind(states.housing)
     paths = [lag(states.housing, states.step, shape[0] * ratio) - first for ratio in (1.0, 1.0 / 3.0, 3.0)]
     return np.stack(paths, axis=1)
