@@ -1,13 +1,14 @@
 """Profiles: piecewise linear functions of time with jumps, from arrays or from words.
 
-A chamber profile in words, temperatures in °C, durations as 90s, 30min or 5h, rates in K/min:
+A chamber profile in words, temperatures in °C, durations as 90s, 30min or 5h (a bare number is seconds), rates in
+K/min:
 
     soak T DURATION                          hold one temperature
     step FROM TO DURATION                    settled at FROM; a jump to TO at once, held for DURATION
     ramp FROM TO RATE                        straight from FROM to TO
     staircase FROM TO STEP HOLD              levels a STEP apart, each held for HOLD, jumps between
     cycle START FIRST SECOND RATE HOLD COUNT COUNT times: ramp to FIRST, hold, ramp to SECOND, hold; back to START
-    … then …                                 one after the other; before a soak the profile may jump, else it begins where it ended
+    … then …                                 one after the other; where temperatures differ the profile jumps
 """
 
 import math
@@ -124,9 +125,7 @@ def parse_profile(words: str) -> Profile:
             piece = build(*values)
         except ThermalError as error:
             raise ThermalError(f"'{given}': {error}") from None
-        offset, last = points[-1] if points else (0.0, piece[0][1])
-        if kind != "soak" and not math.isclose(piece[0][1], last, rel_tol=1e-9, abs_tol=1e-9):
-            raise ThermalError(f"'{given}' begins at {piece[0][1]:g} °C, but the profile before it ends at {last:g} °C: begin there, or soak first.")  # fmt: skip
+        offset = points[-1][0] if points else 0.0
         for time, temperature in piece:
             _append(points, offset + time, temperature)
     time, temperature = np.array(points).T
@@ -204,7 +203,7 @@ def _read(name: str, text: str, sentence: str) -> float:
     number = text
     if name in ("DURATION", "HOLD"):
         suffix = next((unit for unit in UNITS if text.endswith(unit)), "")
-        number, unit = text.removesuffix(suffix), UNITS.get(suffix, math.nan)
+        number, unit = text.removesuffix(suffix), UNITS.get(suffix, 1.0)
     try:
         value = float(number) * unit
     except ValueError:

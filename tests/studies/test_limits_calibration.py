@@ -236,7 +236,7 @@ def test_a_sensor_follows_its_housing_between_rows_too():
 
 def test_a_slower_sensor_reads_its_housing_later():
     """The slope of a reading by the sensor's time constant, of one that begins 1 K warmer than its housing, against differences."""
-    profile = load_profile("soak 20 20min then soak -10 1s then ramp -10 35 1.0 then soak 35 30min")
+    profile = load_profile("soak 20 20min then ramp -10 35 1.0 then soak 35 30min")
     drive = replace(drive_by_profile(profile, rows_of(profile, 1 / 30)), initial={"sensor": 1.0})
 
     def read(tau: float):
