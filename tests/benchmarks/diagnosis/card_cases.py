@@ -130,6 +130,28 @@ def entry(name, response, shape, values):
     return table | effect.numbers(values, response)
 
 
+def hide(card, hidden, drives, seed, rng):
+    """Return a card with an effect (name, response) of some SNR in it, its coefficients, and the level of the response."""
+    (name, response, snr), effect = hidden, library()[hidden[0]]
+    clean = run(card, drives, seed, False)
+    noisy = run(card, drives, seed)
+    noise = left(clean, [n[response] - c[response] for n, c in zip(noisy, clean, strict=True)], response)
+    problem = build_problem(card, noisy, housing=False)
+    shape, values = draw_effect(rng, name, response, Signatures.at(problem, np.zeros(problem.count)).span)
+    level = abs(float(np.median(clean[0][response]))) if response != "bias_deg_per_h" and not effect.thermal else 1.0
+    values = values * effect.sizes[response] * level * 0.03
+
+    def hiding(values):
+        return card.with_table("effect", [entry(name, response, shape, values)])
+
+    for _ in range(2):
+        values = np.minimum(values, 1.0) if effect.sees_heat else values  # all of the heat at most
+        there = run(hiding(values), drives, seed, False)
+        size = left(clean, [a[response] - c[response] for a, c in zip(there, clean, strict=True)], response) / noise
+        values = values * snr / max(size, 1e-9)
+    return hiding(values), values, level
+
+
 @dataclass(frozen=True)
 class Case:
     """A card, the device that hides an effect from it, and how both are driven; `name` is empty where nothing is hidden."""
@@ -159,27 +181,12 @@ def make_case(seed):
         drives = one_after_the_other(profiles)
     if not hidden:
         return Case(card, card, drives, seed)
-    clean = run(card, drives, seed, False)
-    noisy = run(card, drives, seed)
-    noise = left(clean, [n[response] - c[response] for n, c in zip(noisy, clean, strict=True)], response)
-    problem = build_problem(card, noisy, housing=False)
-    shape, values = draw_effect(rng, name, response, Signatures.at(problem, np.zeros(problem.count)).span)
-    level = abs(float(np.median(clean[0][response]))) if response != "bias_deg_per_h" and not effect.thermal else 1.0
-    values = values * effect.sizes[response] * level * 0.03
-
-    def hiding(values):
-        return card.with_table("effect", [entry(name, response, shape, values)])
-
-    for _ in range(2):
-        values = np.minimum(values, 1.0) if effect.sees_heat else values  # all of the heat at most
-        there = run(hiding(values), drives, seed, False)
-        size = left(clean, [a[response] - c[response] for a, c in zip(there, clean, strict=True)], response) / noise
-        values = values * snr / max(size, 1e-9)
+    device, values, level = hide(card, (name, response, snr), drives, seed, rng)
     if abs(values[0]) > STRONGEST * effect.sizes[response] * level * effect.spread[0]:
         raise InputError(f"{name}: no gyro shows what SNR {snr:g} would take in {card.name}")
     if effect.sees_heat and values[0] > 1.0:
         raise InputError(f"{name}: even if all heat took this way it would not reach SNR {snr:g} in {card.name}")
-    return Case(card, hiding(values), drives, seed, name, response, snr)
+    return Case(card, device, drives, seed, name, response, snr)
 
 
 def ceiling(seed):
