@@ -26,6 +26,7 @@ ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 
 DRAWS = 8
 """Of normal noise, none of which may show as much switching: noise that keeps its level for some rows is no telegraph."""
+LAST_DIGIT = "the last digit of the readings"
 REPEATED, ROUNDING = 0.5, 1.3
 """Part of the readings that are as the one before, from which on they are rounded to more than their noise; the rms of that, in its own parts."""
 
@@ -122,7 +123,7 @@ def look(
             gained = max(own.evidence - before.evidence, 0.0)
             share = min(share, gained / max(gained + evidence, 1e-9))
         if name in rows and is_rounding(problem, name, rows[name]):
-            word, evidence, line = "the last digit of the readings", min(evidence, 0.0), None
+            word, evidence, line = LAST_DIGIT, min(evidence, 0.0), None
         found[name] = Leftover(word, float(evidence), share, len(mine), line)
     return found
 

@@ -12,7 +12,7 @@ from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, ResponseResult
 from studies.inference.causes import SURE_DELAY, delay_of, farthest
 from studies.inference.inferred import Inferred
-from studies.inference.lack_of_fit import doubt_of
+from studies.inference.lack_of_fit import LAST_DIGIT, doubt_of
 
 FEWEST_LAGS = 3.0
 """Time constants that the records must cover before they confirm a law whose lag is free."""
@@ -23,6 +23,7 @@ LEAST_DELAY = 0.5
 """Part of what sensors and clocks usually have, from which on a delay is said."""
 ODD = 5.0
 """Times the scatter of the other runs from which on one is odd."""
+ROUNDED = "what is left of it is the last digit of its readings; less than a digit of structure would not show"
 NARROW_RANGE = 1.0
 """Kelvin below which a temperature does not vary."""
 
@@ -39,7 +40,8 @@ def result_of(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseRe
     share = (left.share if left.significant else 1.0) if terms else None
     slow = _slow(found, name)
     verdict, remark = _judge(found, name, terms, mine, values, slow, share)
-    remarks = (remark, _delayed(found, name), _correlated(found, name), _turned_on(found, name, verdict))
+    coarse = ROUNDED if left.input == LAST_DIGIT else ""
+    remarks = (remark, coarse, _delayed(found, name), _correlated(found, name), _turned_on(found, name, verdict))
     remark = "; ".join(filter(None, remarks))
     noise = min(value for value in (rows.rms, after if terms else before) if value is not None)
     white = white_rms(*rows.residual)

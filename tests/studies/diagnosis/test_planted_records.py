@@ -442,4 +442,6 @@ def test_what_rounding_leaves_is_no_structure():
         "bias_deg_per_h": np.round((0.05 * x + noise * rng.standard_normal(t.size)) / step) * step,
         "inverse_q": np.round(120.7 + 0.012 * x + 0.25 * rng.standard_normal(t.size)) * digit,
     }
-    assert diagnose_records([Record(columns, path="run.csv", sha256="1")]).verdict.verdict == "adequate"
+    verdict = diagnose_records([Record(columns, path="run.csv", sha256="1")]).verdict
+    assert verdict.verdict == "adequate"
+    assert "the last digit of its readings" in verdict.responses["bias_deg_per_h"].remark
