@@ -97,15 +97,6 @@ class ObservedRun:
             found[name] = (since, own) if good.all() else (since[good], own[good])
         return found
 
-    def means_of_rows(self, name: str, rows: Array) -> Array:
-        """Return means over the blocks of a response of what its `own_rows` have, (m,)."""
-        block = self.responses[name]
-        begins = block.predicted[block.rows[block.edges]] - self.record["time_s"][0]
-        if block.width.any():  # each of these rows is the mean of a group about it
-            begins = begins - 0.5 * float(np.median(np.diff(block.predicted)))
-        group = np.searchsorted(begins, self.own_rows[name][0], side="right") - 1
-        return average_groups(rows, np.maximum(group, 0), len(begins))
-
     def explaining(self, names: Sequence[str]) -> "ObservedRun":
         """Return it with some responses alone; without the housing among them the chamber drives nothing."""
         kept = {name: own for name, own in self.responses.items() if name in names}

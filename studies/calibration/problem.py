@@ -152,11 +152,6 @@ class CardProblem:
             found[SETTLED] = NoiseRows.of([SOAK * np.cumsum(one) for one in readings], readings)
         return found
 
-    def block_means(self, response: str, rows: Sequence[Array]) -> list[Array]:
-        """Return means over the blocks of a response of what its own rows have in each run, (m,)."""
-        runs = [self.runs[part.run] for part in self.members(response)]
-        return [run.means_of_rows(response, own) for run, own in zip(runs, rows, strict=True)]
-
     def instrument_at(self, point: Array) -> "Instrument":
         """Return the instrument with the values of a point."""
         return self.instrument.with_values(self.priors.at(point[: len(self.priors.values)]))

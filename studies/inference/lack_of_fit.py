@@ -9,6 +9,7 @@ import numpy as np
 from compensation.arrays import Array
 from compensation.lines import Line
 from compensation.noise_estimate import price_of
+from compensation.noise_rows import NoiseRows
 from compensation.spikes import find_step
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
@@ -29,8 +30,6 @@ DRAWS = 8
 LAST_DIGIT = "the last digit of the readings"
 REPEATED, ROUNDING = 0.5, 1.3
 """Part of the readings that are as the one before, from which on they are rounded to more than their noise; the rms of that, in its own parts."""
-
-
 COARSE = 0.6
 """Residual over the last digit, up to which it makes of noise what is brief, and levels."""
 
@@ -97,15 +96,12 @@ def look(
         white = level.whiten(rest, final.noise[name])
         apart = [np.sign(rest[place]) * (far > 1) for place, far in zip(level.slices, level.stretch, strict=True)]
         # readings between two digits are two levels, one of them at times brief
-        coarse = name in rows and rows[name].rms < COARSE * _digit(problem, name)
-        brief = (
-            -np.inf
-            if coarse
-            else max(brief_events(white, tails_of(white / max(float(np.std(white)), 1e-300))), recurring(apart))
-        )
+        coarse = name in rows and rows[name].rms < COARSE * find_step(np.concatenate(_readings(problem, name)))
+        tails = tails_of(white / max(float(np.std(white)), 1e-300))
+        brief = -np.inf if coarse else max(brief_events(white, tails), recurring(apart))
         if brief > evidence:
             word, evidence = "time: brief events", brief
-        even = white / _louder(problem, name, rows[name]) if name in rows else white
+        even = white / _louder(level, rows[name]) if name in rows else white
         fitful = intermittent([even[place] for place in level.slices])
         if fitful > evidence:
             word, evidence = "time: an intermittent oscillation", fitful
@@ -130,23 +126,20 @@ def look(
 
 def is_rounding(problem: CardProblem, name: str, rest: Rows) -> bool:
     """Whether what is left of readings that mostly repeat is what a step of q leaves, q/√12: it follows the level as structure does."""
-    repeats = np.concatenate([np.diff(own) == 0.0 for own in _readings(problem, name)])
-    return repeats.mean() > REPEATED and rest.rms < ROUNDING * _digit(problem, name) / 12**0.5
+    readings = _readings(problem, name)
+    repeats = np.concatenate([np.diff(own) == 0.0 for own in readings])
+    return repeats.mean() > REPEATED and rest.rms < ROUNDING * find_step(np.concatenate(readings)) / 12**0.5
 
 
 def _readings(problem: CardProblem, name: str) -> list[Array]:
     return [problem.runs[part.run].own_rows[name][1] for part in problem.members(name)]
 
 
-def _digit(problem: CardProblem, name: str) -> float:
-    """Step to which readings are rounded."""
-    return find_step(np.concatenate(_readings(problem, name)))
-
-
-def _louder(problem: CardProblem, name: str, rest: Rows) -> Array:
-    """How many times louder than usual the noise of the rows in each block is."""
-    means = problem.block_means(name, [loudness(own) for own in rest.residual])
-    return np.sqrt(np.maximum(np.concatenate(means), 1.0))
+def _louder(level: NoiseRows, rest: Rows) -> Array:
+    """How many times louder than usual the noise of the rows about each block is."""
+    runs = zip(level.times, rest.time, rest.residual, strict=True)
+    about = [np.interp(t - t[0], rows - rows[0], loudness(own)) for t, rows, own in runs]
+    return np.asarray(np.sqrt(np.maximum(np.concatenate(about), 1.0)))
 
 
 def _instead_of_noise(search: Search, bank: Sequence[Shapes], final: Hypothesis, name: str) -> Hypothesis | None:
