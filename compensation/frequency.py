@@ -112,7 +112,10 @@ def find_turn(curve: Callable[[Array], Array], span: tuple[float, float]) -> flo
     T = np.linspace(*span, GRID)
     rise = np.sign(np.diff(curve(T)))
     turned = np.flatnonzero((rise != rise[GRID // 2]) | (rise == 0))
-    return float(T[turned[np.argmin(np.abs(turned - GRID // 2))]]) if turned.size else None
+    if not turned.size:
+        return None
+    k = int(turned[np.argmin(np.abs(turned - GRID // 2))])
+    return float(T[k + (k < GRID // 2)])  # where the way up meets the way down
 
 
 def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency: Array) -> Array:

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from compensation.errors import CompensationError
-from compensation.frequency import compare_orders, fit_frequency
+from compensation.frequency import compare_orders, find_turn, fit_frequency
 from studies.models.kinds.frequency import save_frequency, temperature_error
 
 T = np.linspace(-20, 40, 13)
@@ -110,3 +110,9 @@ def test_nothing_is_extrapolated_unless_asked():
     with pytest.raises(CompensationError, match="lies outside"):
         fit.temperature(4450.0)
     assert fit.frequency(41.0, extrapolate=True) > fit.frequency(40.0)
+
+
+@pytest.mark.parametrize("turn", [20.0, 60.0])
+def test_a_curve_turns_where_its_slope_is_zero(turn):
+    """Below the middle of the range the grid's step before it was said."""
+    assert find_turn(lambda T: (T - turn) ** 2, (-60.0, 140.0)) == pytest.approx(turn, abs=1e-9)
