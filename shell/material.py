@@ -256,7 +256,7 @@ def check_sign(
     if name not in ("poisson_ratio", "expansion"):
         least, most, unit = (sizes or {}).get(name, (1e-30, 1e30, "in SI units"))
         if not ((values > least) & (values < most)).all():
-            raise ShellError(f"{where}: must be {least:g} to {most:g} {unit} everywhere within range_degC.")
+            raise ShellError(f"{where}: must be positive, {least:g} to {most:g} {unit}, everywhere within range_degC.")
 
 
 def spell(names: Sequence[str]) -> str:

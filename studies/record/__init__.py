@@ -214,7 +214,7 @@ def read_profile(path: "str | Path | DataFrame") -> Columns:
     table = read_columns(path, PROFILE_COLUMNS, required=PROFILE_COLUMNS)
     table.require(PROFILE_COLUMNS, "a profile")
     time = table.values["time_s"]
-    twice = "time_s is there twice: for a jump, let the second row come a moment later, such as 0.001 s."
+    twice = "time_s does not increase, it is there twice: for a jump, let the second row come a moment later, such as 0.001 s."
     table.check_order("time_s", lambda row: twice if row and time[row] == time[row - 1] else "time_s goes back; sort the rows.")  # fmt: skip
     check_plausible(table.values, table.place)
     return table
