@@ -433,5 +433,5 @@ def test_a_file_of_two_runs_is_to_be_split(tmp_path):
     with pytest.raises(InputError, match=r"twice\.csv, line 5: comments .* or split the file here"):
         read_record(tmp_path / "twice.csv")
     (tmp_path / "jump.csv").write_text("time_s,chamber_temperature_degC\n0,20\n60,20\n60,10\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"jump\.csv, line 4: time_s is there twice: for a jump"):
+    with pytest.raises(InputError, match=r"jump\.csv, line 4: time_s does not increase, it is there twice: for a jump"):
         load_profile(str(tmp_path / "jump.csv"))
