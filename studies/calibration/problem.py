@@ -14,6 +14,7 @@ import numpy as np
 from compensation.arrays import Array
 from compensation.noise import white_rms
 from compensation.noise_rows import NoiseRows
+from compensation.spikes import find_step
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable
 from studies.calibration.priors import Priors
 from studies.resonator.law import law_of, moved_law
@@ -135,6 +136,15 @@ class CardProblem:
     def members(self, response: str) -> tuple[Part, ...]:
         """Parts that explain a response, in the order of its rows."""
         return tuple(part for part in self.parts if response in part.responses)
+
+    @cached_property
+    def digits(self) -> Mapping[str, float]:
+        """Step to which the readings of every response are rounded, as they are in its own rows."""
+        return {
+            name: find_step(np.concatenate([self.runs[part.run].own_rows[name][1] for part in self.members(name)]))
+            for name in self.responses
+            if name != SETTLED
+        }
 
     @cached_property
     def rows(self) -> Mapping[str, NoiseRows]:

@@ -14,6 +14,7 @@ from studies.calibration.noise_levels import stated_noise
 from studies.calibration.observed import NEIGHBOURS, SETTLED, UNITS, WORDS
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.verdict import FAR
+from studies.errors import numbered
 from studies.instrument.display import display_name
 from studies.simulation.virtual_gyro import idle_effects
 
@@ -46,7 +47,7 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
     for name, count in found.outliers.items():
         if count:
             warnings.append(
-                f"{count} {'block' if count == 1 else 'blocks'} of the {WORDS[name]} {'is an outlier and was' if count == 1 else 'are outliers and were'} given less weight."
+                f"{numbered(count, 'block')} of the {WORDS[name]} {'is an outlier and was' if count == 1 else 'are outliers and were'} given less weight."
             )
     told = sum(rows[name].count for name in rows)
     if len(estimates) > told:

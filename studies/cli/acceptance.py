@@ -9,7 +9,7 @@ from studies.acceptance.limits import ELSEWHERE, SCHEMA, Limits
 from studies.acceptance.measure import CONFIDENCE
 from studies.cli.arguments import Card, Records
 from studies.cli.output import answers, say
-from studies.errors import InputError, nearest
+from studies.errors import InputError, nearest, numbered
 from studies.fits.ringdown import is_decay, read_decay
 from studies.instrument.card import load_card
 from studies.instrument.units import unit_of
@@ -103,7 +103,7 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
             *(Sentence(f"{decay.path}: {' '.join(decay.remarks)}", "warning") for decay in decays if decay.remarks),
         ]),
     ]  # fmt: skip
-    lead = f"{len(runs)} record{'s' * (len(runs) != 1)} of {instrument.name}, judged in the order of section 12 of IEEE Std 1431-2004. Intervals are 90 %; the zero-rate output is {output}."
+    lead = f"{numbered(len(runs), 'record')} of {instrument.name}, judged in the order of section 12 of IEEE Std 1431-2004. Intervals are 90 %; the zero-rate output is {output}."
     return Result(payload, f"Acceptance of {instrument.name}: {found.verdict}", lead, parts)
 
 

@@ -11,7 +11,7 @@ from compensation.wave_fit import MISALIGNED, WaveFit
 from compensation.wave_fit import fit_whole_angle as fit
 from studies.cli.arguments import FRACTION, Confidence, Run, open_given
 from studies.cli.output import answers, keep_card, say
-from studies.errors import InputError, naming
+from studies.errors import InputError, naming, numbered
 from studies.instrument.card import Instrument
 from studies.instrument.tables.loop import Loop
 from studies.record import Record, read_record
@@ -149,7 +149,7 @@ def _row(key: str, estimate: dict[str, float]) -> dict[str, str | float]:
 
 def _left_out(name: str, times: list[float]) -> str:
     some = ", ".join(f"{time:g}" for time in times[:3]) + ", …" * (len(times) > 3)
-    rows = f"{len(times)} row{'s' * (len(times) > 1)} of {name}"
+    rows = f"{numbered(len(times), 'row')} of {name}"
     return f"{rows}, at {some} s: left out, contradicted by the rows beside."
 
 

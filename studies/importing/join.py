@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from compensation.arrays import Array
-from studies.errors import InputError
+from studies.errors import InputError, numbered
 from studies.files.stored import Stored, portions
 from studies.importing.channels import read_tables
 from studies.importing.clock import Clock, seconds_between
@@ -121,7 +121,7 @@ def _report_gaps(one: ClockedFile) -> list[str]:
     if not count:
         return [f"{usual}; no gap longer than {limit:.6g} s"]
     return [
-        f"{usual}; {count} {'gap' if count == 1 else 'gaps'} longer than {limit:.6g} s, {total:.6g} s together, the"
+        f"{usual}; {numbered(count, 'gap')} longer than {limit:.6g} s, {total:.6g} s together, the"
         f" longest of {most:.6g} s after {longest - one.span[0]:.6g} s"
     ]
 
@@ -158,7 +158,7 @@ def _read_columns(paths: Sequence[str], file: FileMap, folder: str | None, plain
         return _read_columns(paths, file, folder, plain=False)
     kinds = "an instrument's overload", "0, a dropout"
     return _Columns(rows, clock, time, columns, [
-        f"{n} {'reading' if n == 1 else 'readings'} of '{name}' {'is' if n == 1 else 'are'} {kinds[kind]}: left empty"
+        f"{numbered(n, 'reading')} of '{name}' {'is' if n == 1 else 'are'} {kinds[kind]}: left empty"
         for (kind, name), n in sorted(counts.items(), key=lambda one: one[0][0])
         if n
     ])  # fmt: skip

@@ -10,7 +10,6 @@ from compensation.arrays import Array
 from compensation.lines import Line
 from compensation.noise_estimate import price_of
 from compensation.noise_rows import NoiseRows
-from compensation.spikes import find_step
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import spell_structure
@@ -96,9 +95,8 @@ def look(
         white = level.whiten(rest, final.noise[name])
         apart = [np.sign(rest[place]) * (far > 1) for place, far in zip(level.slices, level.stretch, strict=True)]
         # readings between two digits are two levels, one of them at times brief
-        coarse = name in rows and rows[name].rms < COARSE * find_step(np.concatenate(_readings(problem, name)))
-        tails = tails_of(white / max(float(np.std(white)), 1e-300))
-        brief = -np.inf if coarse else max(brief_events(white, tails), recurring(apart))
+        coarse = name in rows and rows[name].rms < COARSE * problem.digits[name]
+        brief = -np.inf if coarse else max(_brief(white), recurring(apart))
         if brief > evidence:
             word, evidence = "time: brief events", brief
         even = white / _louder(level, rows[name]) if name in rows else white
@@ -124,15 +122,16 @@ def look(
     return found
 
 
+def _brief(white: Array) -> float:
+    """Log evidence of brief events in rows of white noise, over such noise with tails as heavy as theirs."""
+    return brief_events(white, tails_of(white / max(float(np.std(white)), 1e-300)))
+
+
 def is_rounding(problem: CardProblem, name: str, rest: Rows) -> bool:
     """Whether what is left of readings that mostly repeat is what a step of q leaves, q/√12: it follows the level as structure does."""
-    readings = _readings(problem, name)
+    readings = [problem.runs[part.run].own_rows[name][1] for part in problem.members(name)]
     repeats = np.concatenate([np.diff(own) == 0.0 for own in readings])
-    return repeats.mean() > REPEATED and rest.rms < ROUNDING * find_step(np.concatenate(readings)) / 12**0.5
-
-
-def _readings(problem: CardProblem, name: str) -> list[Array]:
-    return [problem.runs[part.run].own_rows[name][1] for part in problem.members(name)]
+    return bool(repeats.mean() > REPEATED and rest.rms < ROUNDING * problem.digits[name] / 12**0.5)
 
 
 def _louder(level: NoiseRows, rest: Rows) -> Array:

@@ -66,8 +66,7 @@ def make_ready(given: Sequence[Record]) -> Campaign:
             notes.append(f"{name} is not in every record and was left out.")
             tables = [{key: own for key, own in table.items() if key != name} for table in tables]
     if outliers:
-        one = outliers == 1
-        notes.insert(0, "1 outlying value was left out." if one else f"{outliers} outlying values were left out.")
+        notes.insert(0, f"{numbered(outliers, 'outlying value')} {'was' if outliers == 1 else 'were'} left out.")
     out = []
     for record, table in zip(kept, tables, strict=True):
         columns = {key: own for key, own in table.items() if key != "temperature" and key not in skipped}

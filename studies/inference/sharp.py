@@ -58,6 +58,7 @@ def loudness(rows: Array) -> Array:
 
 
 NEAR = 25
+"""Differences beside a row that say how loud noise is there."""
 CELLS = (8, 16, 32, 64, 128)
 """Rows to a short periodogram."""
 FEWEST_CELLS = 6

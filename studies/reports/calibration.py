@@ -10,6 +10,7 @@ from shell.constants import zero_Celsius
 from shell.material import spell
 from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import HOUSING, QUADRATURE, SETTLED, WORDS
+from studies.errors import numbered
 from studies.instrument.display import display_name
 from studies.reports import style
 from studies.reports.digits import plain
@@ -70,7 +71,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
     rows = best_known_first(payload)
     touched = [one for one in rows if one["width"] <= 0.9995 or abs(one["shift_sd"]) >= 0.005]
     rest = [one for one in rows if one not in touched]
-    unchanged = f" The data do not depend on {len(rest)} more value{'s' * (len(rest) > 1)}." if rest else ""
+    unchanged = f" The data do not depend on {numbered(len(rest), 'more value')}." if rest else ""
     runs = set(found.ladder) - {SETTLED}
     notes = [*([OFFSETS, DRIVEN] if runs else []), *([ROWS] if SETTLED in found.ladder else [])]
     levels = [

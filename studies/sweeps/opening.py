@@ -6,7 +6,7 @@ import warnings
 from pathlib import Path
 from typing import IO
 
-from studies.errors import InputError, MissingEnvironment
+from studies.errors import InputError, MissingEnvironment, numbered
 from studies.files.writing import written_whole
 from studies.sweeps.sealed import SealedFile
 from studies.sweeps.store import FILE, Store, now_utc, say_damaged
@@ -47,7 +47,7 @@ def claim_store(folder: str | Path) -> Store:
             _leave_out(store.file, path)
             count = len(store.file.damaged)
             warnings.warn(
-                f"{path}: damaged in {count} place{'s' * (count > 1)}; the damaged cases are left out and computed again.",
+                f"{path}: damaged in {numbered(count, 'place')}; the damaged cases are left out and computed again.",
                 stacklevel=3,
             )
             store = Store(path.open("r+b", buffering=0), path, lock)
