@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 Progress = Callable[[str], None]
 
 
-def simulate(card: Card, profile: Run, *, row: float = 1.0, seed: int = 0, noise: bool = True) -> Record:
+def simulate(
+    card: Card, profile: Run, *, row: float = 1.0, seed: int = 0, noise: bool = True, start: float = 0.0
+) -> Record:
     """Return the record of a virtual run: `hrg simulate`.
 
     Args:
@@ -36,7 +38,9 @@ def simulate(card: Card, profile: Run, *, row: float = 1.0, seed: int = 0, noise
         row: Time between rows (s).
         seed: Of the noise.
         noise: False records what is true.
+        start: Time (s) of a record whose readings tell how its gyro began; with 0 it begins settled.
     """
+    from studies.calibration.start import begin
     from studies.simulation.chamber import load_drive
     from studies.simulation.virtual_gyro import simulate_run
 
@@ -44,8 +48,13 @@ def simulate(card: Card, profile: Run, *, row: float = 1.0, seed: int = 0, noise
         raise InputError(f"row = {row!r}: give the time between rows, a number of seconds above 0.")
     if not isinstance(seed, Integral) or seed < 0:
         raise InputError(f"seed = {seed!r}: give a whole number, 0 or above.")
-    driven = load_drive(str(profile) if isinstance(profile, str | Path) else read_record(profile), None, 1 / row)
-    return simulate_run(load_card(card), driven, 1 / row, int(seed), noise).told()
+    if not isinstance(start, Real) or not 0 <= start < inf:
+        raise InputError(f"start = {start!r}: give a number of seconds, 0 or above.")
+    instrument, run = load_card(card), str(profile) if isinstance(profile, str | Path) else read_record(profile)
+    driven = load_drive(run, None, 1 / row)
+    if start:
+        driven, _ = begin(instrument, run, driven, float(start))
+    return simulate_run(instrument, driven, 1 / row, int(seed), noise).told()
 
 
 def compare(*cards: Card) -> "Comparison":

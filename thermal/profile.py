@@ -193,6 +193,11 @@ FORMS: dict[str, tuple[tuple[str, ...], Callable[..., Points]]] = {
 TEMPERATURES = ("T", "FROM", "TO", "START", "FIRST", "SECOND")
 
 
+def parse_duration(text: str) -> float:
+    """Read a duration in words (s), such as 5h, 30min or 90s."""
+    return _read("DURATION", text, text)
+
+
 def _forms() -> str:
     forms = "; ".join(f"{kind} {' '.join(names)}" for kind, (names, _) in FORMS.items())
     return f"A profile is one of: {forms}; joined by 'then'. Example: step 20 -10 5h."

@@ -68,6 +68,13 @@ class BlockMeans:
         total = np.add.reduceat(column[self.rows], self.edges, axis=0)
         return np.asarray(total / self.counts.reshape(-1, *[1] * (total.ndim - 1)))
 
+    def until(self, end: float) -> "BlockMeans":
+        """Return those blocks alone whose middle is not after `end` (s)."""
+        count = int(np.searchsorted(self.time, end, side="right"))
+        rows = self.rows[: self.edges[count]] if count < len(self.edges) else self.rows
+        of_block = {name: getattr(self, name)[:count] for name in ("edges", "counts", "time", "value")}
+        return replace(self, rows=rows, **of_block)
+
     @property
     def span(self) -> Array:
         """Seconds of each block that have values."""

@@ -5,13 +5,16 @@ from typing import Annotated, Literal
 import numpy as np
 from cyclopts import Parameter
 
+from compensation.arrays import Array
 from studies.calibration.ahead import spread_of_prediction
+from studies.calibration.start import begin
 from studies.cli.arguments import POSITIVE, PROFILE, Card, Out, Seed, Theory
 from studies.cli.output import answers, keep_record, say
 from studies.instrument.card import load_card
 from studies.results import Figure, Result, Sentence, Table, row_of
-from studies.simulation.chamber import load_drive
+from studies.simulation.chamber import is_record, load_drive
 from studies.simulation.virtual_gyro import simulate_run
+from thermal.profile import parse_duration
 
 DRIVES = (
     "Further columns of the file command the drives (drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg) or"
@@ -19,7 +22,9 @@ DRIVES = (
 )
 
 UNCERTAINTY = "Uncertainty of the prediction (standard deviation, rms over the run)"
-SPREAD = "0: column | 1: standard deviation .3"
+SPREAD = "0: column | 1: standard deviation .3 | 2: of that by the start .3"
+BEGUN = "How the run began: departures from having settled"
+DEPARTURES = "0: part | 1: departure K .3 | 2: standard deviation K .3"
 
 
 @answers("hrg.simulate/1")
@@ -34,6 +39,7 @@ def simulate(
     theory: Theory = "solid",
     boundary: Literal["chamber", "housing"] | None = None,
     spread: bool = False,
+    start: str | None = None,
 ) -> Result:
     """Run a virtual gyro through a chamber profile, or through the temperatures of a record, and write the record.
 
@@ -48,17 +54,26 @@ def simulate(
         row: Time between rows in s; a record keeps its rows.
         noiseless: Leave out noise, sensor lag and rounding.
         boundary: Column of a record that is imposed: chamber or housing.
-        spread: Show the standard deviation of every column due to the uncertainties of the card and, as a calibration found it, the level of a run, without noise.
+        spread: Show the standard deviation of every column due to the uncertainties of the card, how the run of a record began and, as a calibration found it, the level of a run, without noise.
+        start: Time of a record (30min, 2h) whose readings tell how its gyro began; else it begins settled at the first temperature.
     """
     instrument = load_card(card)
-    run = simulate_run(instrument, load_drive(profile, boundary, 1 / row), 1 / row, seed, not noiseless, theory)
+    drive, begun = load_drive(profile, boundary, 1 / row), None
+    if start or (spread and is_record(profile)):
+        drive, begun = begin(instrument, profile, drive, parse_duration(start) if start else 0.0)
+    run = simulate_run(instrument, drive, 1 / row, seed, not noiseless, theory)
     for warning in run.warnings:
         say(f"warning: {warning}")
     keep_record(run.record, out)
-    known: dict[str, float] | None = None
+    known: dict[str, tuple[float, float]] | None = None
     if spread:
-        found = spread_of_prediction(instrument, run.prediction.drive, run.law)
-        known = {name: float(np.sqrt(np.mean(values**2))) for name, values in found.items() if name in run.record}
+        by_card = spread_of_prediction(instrument, run.prediction.drive, run.law)
+        by_start = begun.spread(instrument, run.prediction.drive, run.law) if begun else {}
+        known = {
+            name: (_rms(values), _rms(by_start.get(name, 0.0)))
+            for name, values in by_card.items()
+            if name in run.record
+        }
     summary = {
         "card": instrument.name,
         "out": out,
@@ -69,7 +84,9 @@ def simulate(
         "seed": None if noiseless else seed,
         "frequency_Hz": {"first": run.record["frequency_Hz"][0], "last": run.record["frequency_Hz"][-1]},
         **row_of(run.law, solver_relative_error="solver_error", interpolation_relative_error="interpolation_error"),
-        "spread": known,
+        "start": begun
+        and {part: {"departure_K": value, "sd_K": begun.widths[part]} for part, value in begun.departures.items()},
+        "spread": known and {name: float(np.hypot(*both)) for name, both in known.items()},
         "warnings": run.warnings,
     }
     solved = f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error {run.law.solver_error:.0e}, both relative."
@@ -83,7 +100,18 @@ def simulate(
             f"{out}: {len(run.record)} rows over {length:g} s; the resonator's temperature varies by {span:.2f} K.",
             solved if instrument.polynomial is None else None,
             *(Sentence(one, "warning", "page") for one in run.warnings),
-            Table(UNCERTAINTY, list((known or {}).items()), SPREAD),
+            Table(
+                UNCERTAINTY,
+                [(name, float(np.hypot(own, begin)), begin) for name, (own, begin) in (known or {}).items()],
+                SPREAD,
+            ),
+            Table(BEGUN, [(part, value, begun.widths[part]) for part, value in begun.departures.items()], DEPARTURES)
+            if begun
+            else None,
             Figure(run.record.plot, "The columns of the record."),
         ],
     )
+
+
+def _rms(values: Array | float) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

@@ -59,19 +59,27 @@ def load_drive(text: "str | Record", boundary: "Boundary | None" = None, rate: f
     """Read what drives a run: a profile, its commands at `rate` rows per second, or a record's measured column, the
     housing's if it has one.
     """
-    from studies.record import PROFILE_COLUMNS, read_record
-    from studies.simulation.drive import COMMAND_COLUMNS, drive_by_record, drive_by_schedule
+    from studies.record import read_record
+    from studies.simulation.drive import drive_by_record, drive_by_schedule
 
-    columns = set(_columns_of(text))
-    if columns - {*PROFILE_COLUMNS, *COMMAND_COLUMNS} or (columns and not set(PROFILE_COLUMNS) <= columns):
+    if is_record(text):
         return drive_by_record(read_record(text), boundary)
     if boundary == "housing":
         raise InputError(f"{text}: only a record has a housing column to impose; leave out --boundary housing.")
     chamber, commands = load_schedule(text)
-    moment = read_record(text).moment if columns else None
+    moment = read_record(text).moment if _columns_of(text) else None
     if not commands and moment is None:
         return chamber
     return replace(drive_by_schedule(chamber, commands, rate), moment=moment, source=str(text))
+
+
+def is_record(text: "str | Record") -> bool:
+    """Whether something is a measured run, which has other columns than a profile and its commands."""
+    from studies.record import PROFILE_COLUMNS
+    from studies.simulation.drive import COMMAND_COLUMNS
+
+    columns = set(_columns_of(text))
+    return bool(columns) and not set(PROFILE_COLUMNS) <= columns <= {*PROFILE_COLUMNS, *COMMAND_COLUMNS}
 
 
 def _columns_of(text: "str | Record") -> list[str]:

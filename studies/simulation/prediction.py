@@ -108,8 +108,10 @@ def predict(
 def law_for(
     instrument: "Instrument", drive: Drive, margin: float = MARGIN, theory: "Theory" = "solid"
 ) -> "FrequencyLaw":
-    """Build the frequency law over the temperatures of a drive and the reference."""
-    return law_about(instrument, drive.profile.value, margin, theory)
+    """Build the frequency law over the temperatures of a drive, with what parts depart from them at its start, and the reference."""
+    return law_about(
+        instrument, drive.profile.value, margin + max(map(abs, drive.initial.values()), default=0.0), theory
+    )
 
 
 def law_about(
