@@ -39,9 +39,10 @@ class Start:
     root: Array  # array (parts, parts), covariance = root rootᵀ
 
     @property
-    def widths(self) -> dict[str, float]:
-        """Standard deviation of every departure, K."""
-        return dict(zip(self.departures, np.linalg.norm(self.root, axis=1).tolist(), strict=True))
+    def rows(self) -> list[tuple[str, float, float]]:
+        """Every part, its departure and the standard deviation of that, K."""
+        widths = np.linalg.norm(self.root, axis=1)
+        return [(part, T, float(sd)) for (part, T), sd in zip(self.departures.items(), widths, strict=True)]
 
     def spread(self, instrument: "Instrument", drive: "Drive", law: "FrequencyLaw") -> dict[str, Array]:
         """Return √diag(J C Jᵀ) of every column of a predicted run, C of its start."""

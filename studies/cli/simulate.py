@@ -65,15 +65,12 @@ def simulate(
     for warning in run.warnings:
         say(f"warning: {warning}")
     keep_record(run.record, out)
-    known: dict[str, tuple[float, float]] | None = None
+    widths: list[tuple[str, float, float]] = []
     if spread:
         by_card = spread_of_prediction(instrument, run.prediction.drive, run.law)
         by_start = begun.spread(instrument, run.prediction.drive, run.law) if begun else {}
-        known = {
-            name: (_rms(values), _rms(by_start.get(name, 0.0)))
-            for name, values in by_card.items()
-            if name in run.record
-        }
+        both = {name: (_rms(own), _rms(by_start.get(name, 0.0))) for name, own in by_card.items() if name in run.record}
+        widths = [(name, float(np.hypot(own, start_alone)), start_alone) for name, (own, start_alone) in both.items()]
     summary = {
         "card": instrument.name,
         "out": out,
@@ -84,9 +81,8 @@ def simulate(
         "seed": None if noiseless else seed,
         "frequency_Hz": {"first": run.record["frequency_Hz"][0], "last": run.record["frequency_Hz"][-1]},
         **row_of(run.law, solver_relative_error="solver_error", interpolation_relative_error="interpolation_error"),
-        "start": begun
-        and {part: {"departure_K": value, "sd_K": begun.widths[part]} for part, value in begun.departures.items()},
-        "spread": known and {name: float(np.hypot(*both)) for name, both in known.items()},
+        "start": begun and {part: {"departure_K": value, "sd_K": sd} for part, value, sd in begun.rows},
+        "spread": {name: width for name, width, _ in widths} if spread else None,
         "warnings": run.warnings,
     }
     solved = f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error {run.law.solver_error:.0e}, both relative."
@@ -100,14 +96,8 @@ def simulate(
             f"{out}: {len(run.record)} rows over {length:g} s; the resonator's temperature varies by {span:.2f} K.",
             solved if instrument.polynomial is None else None,
             *(Sentence(one, "warning", "page") for one in run.warnings),
-            Table(
-                UNCERTAINTY,
-                [(name, float(np.hypot(own, begin)), begin) for name, (own, begin) in (known or {}).items()],
-                SPREAD,
-            ),
-            Table(BEGUN, [(part, value, begun.widths[part]) for part, value in begun.departures.items()], DEPARTURES)
-            if begun
-            else None,
+            Table(UNCERTAINTY, widths, SPREAD),
+            Table(BEGUN, begun.rows if begun else [], DEPARTURES),
             Figure(run.record.plot, "The columns of the record."),
         ],
     )

@@ -77,7 +77,7 @@ def test_the_width_of_one_departure_is_its_slope_times_its_deviation(card, run):
 def test_a_record_of_temperatures_alone_tells_nothing_of_its_start(card, run, tmp_path, refuse):
     record = run[0]
     bare = Record({name: record[name] for name in ("time_s", "housing_temperature_degC")})
-    assert set(find_start(card, bare, drive_by_record(bare)).widths.values()) == {10.0}
+    assert {sd for _, _, sd in find_start(card, bare, drive_by_record(bare)).rows} == {10.0}
     write_record(bare, tmp_path / "bare.csv")
     words = ["simulate", "hrg-30mm", str(tmp_path / "bare.csv"), "--out", str(tmp_path / "o.csv"), "--start", "30min"]
     assert "no reading of" in refuse(words)
