@@ -168,13 +168,16 @@ def calibrate(
 
 
 def _covered(problem: CardProblem) -> dict[str, object]:
-    """Temperatures that the polynomial of a card stands on: of these records, and of those that its card knows."""
+    """Temperatures that the polynomial of a card stands on, of these records and of those that its card knows, and the responses that none of them has."""
     if problem.instrument.polynomial is None:
         return {}
-    known = problem.instrument.part("posterior").covered_degC or ()
+    told = problem.instrument.part("posterior")
+    known = told.covered_degC or ()
     every = [*(run.inner.profile.value for run in problem.runs), *(one.temperature for one in problem.tables)]
     ends = [*known, *(float(end(T)) - zero_Celsius for T in every for end in (np.min, np.max))]
-    return {"covered_degC": [round(min(ends), 2), round(max(ends), 2)]}
+    covered = {"covered_degC": [round(min(ends), 2), round(max(ends), 2)]}
+    unseen = [name for name in told.unseen if name not in problem.responses]
+    return covered | ({"unseen": unseen} if unseen else {})
 
 
 def _pose(

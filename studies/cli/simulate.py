@@ -22,7 +22,7 @@ DRIVES = (
 )
 
 UNCERTAINTY = "Uncertainty of the prediction (standard deviation, rms over the run)"
-SPREAD = "0: column | 1: standard deviation .3 | 2: of that by the start .3"
+SPREAD = "0: column | 1: in all .3 | 2: by its start .3"
 BEGUN = "How the run began: departures from having settled"
 DEPARTURES = "0: part | 1: departure K .3 | 2: standard deviation K .3"
 
@@ -79,7 +79,9 @@ def simulate(
         "rate_Hz": 1 / float(np.median(np.diff(run.record["time_s"]))),
         "boundary": run.prediction.drive.boundary,
         "seed": None if noiseless else seed,
-        "frequency_Hz": {"first": run.record["frequency_Hz"][0], "last": run.record["frequency_Hz"][-1]},
+        "frequency_Hz": {"first": f[0], "last": f[-1]}
+        if (f := run.record.columns.get("frequency_Hz")) is not None
+        else None,
         **row_of(run.law, solver_relative_error="solver_error", interpolation_relative_error="interpolation_error"),
         "start": begun and {part: {"departure_K": value, "sd_K": sd} for part, value, sd in begun.rows},
         "spread": {name: width for name, width, _ in widths} if spread else None,

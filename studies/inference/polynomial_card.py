@@ -69,6 +69,7 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> Instrument:
         "bias": {"damping_anisotropy": _exact(0.0), "damping_axis_deg": _exact(0.0)},
         "noise": {"housing_lag_s": _exact(0.0), "frequency_flicker_Hz": 0.0, "frequency_walk_Hz": 0.0,
                   "bias_flicker_deg_per_h": 0.0, "bias_walk_deg_per_h_per_rt_h": 0.0},
+        "posterior": {"unseen": [column for column in POWERS if column not in thermometers]},
     }  # fmt: skip
     slope = 1.0
     for column in thermometers:
@@ -102,7 +103,8 @@ def settled_card(table: SettledTable) -> Instrument:
     own = np.asarray(np.polyfit(x, table.frequency, 2)[::-1], dtype=float)
     law = _parabola(own, max(float(np.std(table.frequency)), table.rounding), float(x.max()), WIDE)
     law |= {"a3_per_K3": _exact(0.0), "lag_s": _exact(USUAL_LAG), "delay_s": _exact(0.0)}
-    content = {"schema": SCHEMA, "name": "the table", "reference_temperature_degC": float((T - x)[0]), "law": law}
+    content = {"schema": SCHEMA, "name": "the table", "reference_temperature_degC": float((T - x)[0]), "law": law,
+               "posterior": {"unseen": [column for column in POWERS if column != "frequency_Hz"]}}  # fmt: skip
     return build_instrument(content, table.path)
 
 

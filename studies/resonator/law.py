@@ -77,14 +77,20 @@ def check_slope_known(instrument: "Instrument") -> None:
 
 
 def beyond_records(instrument: "Instrument", temperatures: Array, what: str) -> tuple[str, ...]:
-    """Say by how much temperatures (K) leave those of the records that the polynomial of a card stands on; nothing where they do not."""
-    covered = instrument.part("posterior").covered_degC
-    if covered is None:
-        return ()
-    low, high = covered
-    by = max(low - float(np.min(temperatures)) + zero_Celsius, float(np.max(temperatures)) - zero_Celsius - high)
-    said = f"the records behind the polynomial of this card reach from {low:g} to {high:g} °C, and {what} goes {by:.0f} K beyond: its numbers there are a guess."
-    return (said,) if by > BEYOND else ()
+    """Say of what the records behind a polynomial card know nothing: responses that they lack, and temperatures (K) that leave theirs."""
+    told, said = instrument.part("posterior"), []
+    if told.unseen:
+        said.append(
+            f"no record behind this card had {' or '.join(told.unseen)}: it says nothing of {'it' if len(told.unseen) == 1 else 'them'}."
+        )
+    if told.covered_degC is not None:
+        low, high = told.covered_degC
+        by = max(low - float(np.min(temperatures)) + zero_Celsius, float(np.max(temperatures)) - zero_Celsius - high)
+        if by > BEYOND:
+            said.append(
+                f"the records behind the polynomial of this card reach from {low:g} to {high:g} °C, and {what} goes {by:.0f} K beyond: its numbers there are a guess."
+            )
+    return tuple(said)
 
 
 def moved_law(law: "FrequencyLaw", instrument: "Instrument") -> "FrequencyLaw":

@@ -113,6 +113,9 @@ def simulate_run(
     if drive.rate is not None:
         columns[RATE] = np.degrees(drive.rate)
         columns["measured_rate_deg_per_s"] = columns[RATE] + columns["bias_deg_per_h"] / 3600
+    unseen = instrument.part("posterior").unseen
+    for name in (*unseen, *(("measured_rate_deg_per_s",) if "bias_deg_per_h" in unseen else ())):
+        columns.pop(name, None)
     for name, values in columns.items():
         columns[name] = np.round(values, DIGITS.get(name, COMMAND_DIGITS))
     check_plausible(

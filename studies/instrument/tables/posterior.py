@@ -18,6 +18,7 @@ class Correlations(Keys, frozen=True, kw_only=True):
     frequency_level_Hz: Annotated[float, number("sd of how far the level of a further run may lie from the card's, as the runs tell it", least=0.0)] = 0.0  # fmt: skip
     bias_level_deg_per_h: Annotated[float, number("likewise", least=0.0)] = 0.0
     covered_degC: Annotated[tuple[float, float] | None, says("temperatures of the records, beyond which [law] is a guess")] = None  # fmt: skip
+    unseen: Annotated[tuple[str, ...], says("responses that no record had, of which [law] says nothing")] = ()
     note: Note = ""
 
     def __post_init__(self) -> None:

@@ -14,7 +14,7 @@ from studies.inference.heat_path import with_lags, with_late_sensor
 from studies.inference.polynomial_card import _likeliest_lag, polynomial_card
 from studies.instrument.card import build_instrument, load_card, save_card
 from studies.planning.plan import simulate_plan
-from studies.record import read_record
+from studies.record import Record, read_record
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import simulate
@@ -88,6 +88,24 @@ def test_contract_a_run_beyond_the_records_of_a_polynomial_card_says_so_once(tmp
     assert [str(one.message) for one in heard] == 2 * said
     assert main(["twin", path, "--c", str(tmp_path / "twin")]) == 0
     assert "this twin goes 120 K beyond" in capsys.readouterr().out
+
+
+def test_contract_a_card_says_nothing_of_a_response_that_no_record_had(tmp_path) -> None:
+    """Records of the bias alone make a card that simulates neither frequency nor 1/Q, until it is calibrated with records that have it."""
+    card = build_instrument(TRUE)
+    words = ("step 20 -10 3h", "step -10 40 3h")
+    whole = [simulate_run(card, load_profile(w), 0.05, k).record for k, w in enumerate(words)]
+    kept = ("time_s", "housing_temperature_degC", "bias_deg_per_h")
+    alone = [Record({name: one[name] for name in kept}) for one in whole]
+    saved = tmp_path / "saved.toml"
+    save_card(calibrate(polynomial_card(alone), alone, profile=False, keep=False).instrument, saved)
+    with pytest.warns(UserWarning, match="frequency_Hz or inverse_q: it says nothing of them"):
+        columns = simulate(saved, "step 20 0 1h", row=60).columns
+    assert "bias_deg_per_h" in columns
+    assert not {"frequency_Hz", "inverse_q"} & set(columns)
+    more = [Record({name: one[name] for name in (*kept, "inverse_q")}) for one in whole]
+    again = calibrate(load_card(saved), more, profile=False, keep=False).instrument
+    assert again.part("posterior").unseen == ("frequency_Hz",)
 
 
 def test_contract_a_card_has_one_law() -> None:
