@@ -187,21 +187,30 @@ class Search:
         return now[0] < 0.9 * before[0] or (now[0] == before[0] == 0 and now[1] < before[1] - GAIN)
 
     def settle(self, scalar: Scalar, best: int) -> int:
-        """Return the best design whose parameters are whole steps, where the task asks for steps."""
+        """Return the best design whose parameters are whole steps, where the task asks for steps; the others are searched again."""
         if not self.steps.sizes.any():
             return best
+        half = WIDE if self.steps.leaves_some else FINE
         for _ in range(SETTLING):
-            surface = self.local(self.x[best], FINE)
+            surface = self.local(self.x[best], half)
             x = self.x[best]
             if not self.steps.are_met(x):
                 _, x = self._step(surface, scalar, x, *self._box(x, FINE))
-            judged = [(self._judge(surface, scalar, one), one) for one in self.steps.about(x, self.rng)]
+            about = [self._fit_rest(surface, scalar, one, half) for one in self.steps.about(x, self.rng)]
+            judged = [(self._judge(surface, scalar, one), one) for one in about]
             self.look([one for _, one in sorted(judged, key=lambda pair: pair[0])[:TOGETHER]])
             found = next((k for k in self.rank(scalar) if self.steps.are_met(self.x[k])), best)
-            if found == best:
+            if found == best and half == FINE:
                 break
-            best = found
+            best, half = found, half if found != best else FINE
         return best
+
+    def _fit_rest(self, surface: Interpolant, scalar: Scalar, x: Array, half: float) -> Array:
+        """Return a design of whole steps with its other parameters searched again."""
+        if not self.steps.leaves_some:
+            return x
+        low, high = (np.where(self.steps.sizes > 0, x, end) for end in self._box(x, half))
+        return self._step(surface, scalar, x, low, high)[1]
 
     def local(self, centre: Array, half: float, without: int = -1) -> Interpolant:
         """Return the interpolant through the designs about a centre; those that are next to it where these are too few."""

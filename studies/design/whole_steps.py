@@ -18,6 +18,11 @@ class WholeSteps:
     sizes: Array
     free: int
 
+    @property
+    def leaves_some(self) -> bool:
+        """Whether parameters that may move have no step."""
+        return not self.sizes[: self.free].all()
+
     def are_met(self, x: Array) -> bool:
         """Return whether a design is one of whole steps."""
         sizes = self.sizes[: self.free]

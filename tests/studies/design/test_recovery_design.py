@@ -70,6 +70,22 @@ def test_whole_steps_keep_the_limits(pose):
     assert found.after[0] <= min(x + y for x, y in grid) + 0.02
 
 
+@pytest.mark.parametrize("limits", [{"low": 0.5}, {"low": 0.5, "high": 0.51}])
+def test_what_has_no_step_follows_the_whole_steps(pose, limits):
+    # x in steps of 0.4, y at will: of 0.5/x + x the step 0.8 is best, where the smooth optimum's y = 0.71 is none, or not allowed
+    found = ask(
+        pose(
+            {"x": (0.1, 2.0, {"step": 0.4}), "y": (0.1, 2.0, {})},
+            ["sum", "product"],
+            lambda d: [d[0] + d[1], d[0] * d[1]],
+            objective=[{"column": "sum"}],
+            constraint=[{"column": "product", **limits}],
+        )
+    )
+    assert found.best == pytest.approx([0.8, 0.625], abs=1e-5)
+    assert found.after[1] >= 0.5 * (1 - 1e-6)
+
+
 def test_the_front_of_two_parabolas(pose):
     # (x - 1/2)² and (x - 1)², both least at y = 1: the front is ½ ≤ x ≤ 1, and there √a + √b = ½
     found = ask(
