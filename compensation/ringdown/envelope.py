@@ -20,6 +20,9 @@ CHUNK = 1 << 18
 PASSES = 3  # each takes the image out as the amplitudes of the one before change within the blocks
 WRITTEN = 0.75  # of the last digit by which the times of an even grid may be off: half of it, and the error of the line of all times
 FEWEST, APART = 12, 20  # samples of a block; steps from which a distance between samples is a gap
+NEAR, OFF = 0.01, 0.25
+"""Parts of a frequency that is given: a line as far from it counts half its power; the most that a card or a designer may be off."""
+ABOVE = 30.0  # times the median power of a spectrum, which noise alone passes nowhere
 ALONE = 0.7  # part of a block's samples above which what is left of the image e^{−2iωt} cannot be told from the wave
 SHORTEST = (0.01, 0.1, 0.5)
 """Parts of the distances between rows, of which the shortest that is a step of a grid is taken."""
@@ -63,20 +66,36 @@ class Envelope:
         return float(np.abs(found[np.argmax(near * np.sinc((found - self.carrier) * self.width) ** 2)]))
 
 
-def find_carrier(samples: ArrayLike, rows: NDArray[np.int64], rate: float) -> float:
+def find_carrier(samples: ArrayLike, rows: NDArray[np.int64], rate: float, about: float | None = None) -> float:
     """Return the frequency (Hz) of the largest line of raw samples that stand at, or near, the `rows` of an even grid.
 
-    Strongest 2¹⁸ rows, Hann window, parabola of the log; a lost row counts as zero.
+    Strongest 2¹⁸ rows, Hann window, parabola of the log; a lost row counts as zero. A frequency `about` that of the line says
+    in which zone of half the rate it is, and which line is meant: the nearer a line, the more its power counts.
     """
     x = np.asarray(samples, dtype=np.float64)
     x = x - np.mean(x)
     length = min(int(rows[-1]) + 1, CHUNK)
     at = int(np.argmax(np.bincount(rows // length, x**2)))
-    spectrum = np.sqrt(_spectrum(x, rows, at * length, length))
-    peak = int(np.argmax(spectrum[1:-1])) + 1
-    left, middle, right = np.log(spectrum[peak - 1 : peak + 2] + 1e-300)
-    curve = left - 2 * middle + right
-    return float((peak + (0.5 * (left - right) / curve if curve else 0.0)) * rate / length)
+    power = _spectrum(x, rows, at * length, length)
+
+    def line(weight: Array) -> tuple[int, float]:
+        peak = int(np.argmax((weight * power)[1:-1])) + 1
+        left, middle, right = 0.5 * np.log(power[peak - 1 : peak + 2] + 1e-300)
+        curve = left - 2 * middle + right
+        return peak, float((peak + (0.5 * (left - right) / curve if curve else 0.0)) * rate / length)
+
+    if about is None:
+        return line(np.ones_like(power))[1]
+    seen = alias_of(about, rate)
+    away = np.abs(np.arange(power.size) * rate / length - seen)
+    peak, found = line(1 / (1 + (away / (NEAR * about)) ** 2))
+    if away[peak] > OFF * about or power[peak] < ABOVE * np.median(power):
+        largest = line(np.ones_like(power))[1]
+        raise CompensationError(
+            f"no line of the samples is within {100 * OFF:g} % of the {about:.6g} Hz given; their largest is at {largest:.6g} Hz."
+            " Correct or leave out --frequency, or the reference in the file."
+        )
+    return about + (found - seen) * (1.0 if about % rate <= rate / 2 else -1.0)
 
 
 def _spectrum(x: Array, rows: NDArray[np.int64], first: int, length: int) -> Array:
@@ -87,7 +106,7 @@ def _spectrum(x: Array, rows: NDArray[np.int64], first: int, length: int) -> Arr
 
 
 def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None) -> Envelope:
-    """Return the complex amplitudes of raw samples (channels, N); the carrier (Hz) is the largest line unless given.
+    """Return the complex amplitudes of raw samples (channels, N) about their largest line, or the one that a `carrier` (Hz) is about.
 
     One above half of the sampling rate is found in its alias.
     """
@@ -100,10 +119,14 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     away = float(np.max(np.abs(t - clock)))
     t = clock - clock[0] if away < WRITTEN * _digit(t) else t - t[0]
     rate, span, known = 1 / step, int(rows[-1]) + 1, np.all(np.isfinite(x), axis=0)
-    if carrier is None:
-        carrier = find_carrier(x[int(np.argmax(np.nanvar(x, axis=1))), known], rows[known], rate)
-    if not np.nanvar(x, axis=1).any():
+    if np.count_nonzero(known) < 64:
+        raise CompensationError(
+            f"{np.count_nonzero(known)} rows have a value of every pick-off; a decay needs 64 or more."
+        )
+    variances = np.var(x[:, known], axis=1)
+    if not variances.any():
         raise CompensationError("the samples are all 0 or alike: nothing was recorded; check the pick-off.")
+    carrier = find_carrier(x[int(np.argmax(variances)), known], rows[known], rate, carrier)
     seen = alias_of(carrier, rate)  # Hz, where these rows hold it
     period = rate / max(seen, rate / t.size)  # in rows of the grid
     clipped, after = _clipped(x)

@@ -205,8 +205,15 @@ def test_refused():
     driven = noisy(np.ones((2, TIME.size), dtype=complex) * np.array([[1.0], [0.5j]]), 0.02, random)
     with pytest.raises(CompensationError, match="nothing decays"):
         analyse_decay(from_lock_in(TIME, driven, CARRIER))
+    time = np.arange(1000) / 1000
     with pytest.raises(CompensationError, match="fall together"):
-        mix_down(np.arange(1000) / 1000, random.standard_normal((1, 1000)), 7000.0)
+        mix_down(time, np.exp(-time / 0.3) * np.cos(2 * np.pi * 7000.0 * time), 7000.0)
+    with pytest.raises(CompensationError, match="within 25 % of the 7000 Hz given"):
+        mix_down(time, random.standard_normal((1, 1000)), 7000.0)
+    empty = np.full((2, 1000), np.nan)
+    empty[0, ::2] = empty[1, 1::2] = 1.0
+    with pytest.raises(CompensationError, match="0 rows have a value of every pick-off"):
+        mix_down(time, empty)
     with pytest.raises(CompensationError, match="299 rows repeat the one before or are 0"):
         from_lock_in(np.arange(300.0), np.ones((2, 300)), CARRIER)
     t, quiet = np.arange(500) / 500, 3e-6 * np.random.default_rng(0).standard_normal(500)
@@ -452,6 +459,33 @@ def test_an_alias_whose_frequency_is_given_gives_the_resonator():
         held += inside.values()
     assert np.sqrt(np.mean(np.square(scores))) < 1.35
     assert np.mean(held) >= 0.78
+
+
+@pytest.mark.parametrize("line", [4580.0, 4606.0, 4620.0])
+def test_a_frequency_given_off_the_line_says_in_which_zone_it_is(line):
+    """1 kHz samples mixed at 4599.68 Hz, as it was given, held a mode and its own alias: two modes 26.67 Hz apart, or interference."""
+    time = np.arange(20_000) / 1e3
+    x = np.exp(-time / 12) * np.cos(2 * np.pi * line * time) + 1e-3 * np.random.default_rng(0).standard_normal(
+        time.size
+    )
+    found = analyse_decay(mix_down(time, x, 4599.68))
+    assert found.estimates["frequency_Hz"].value == pytest.approx(line, abs=1e-4)
+    assert found.estimates["decay_time_s"].value == pytest.approx(12, rel=2e-3)
+    assert "split_Hz" not in found.estimates
+    assert not found.interference
+
+
+def test_a_frequency_given_that_is_of_no_line_is_refused_and_another_line_is_not_taken():
+    random, time = np.random.default_rng(1), np.arange(40_000) / 11_025
+    x = Gyro(4400.0, 4400.12, 3e4, 3.3e4, 0.3, 0.3).samples(time, [1.0, 0.7]) + 2e-3 * random.standard_normal(
+        (2, 40_000)
+    )
+    x += 3 * np.sin(2 * np.pi * 50 * time)  # hum, the largest line
+    for given in (4350.0, 4700.0):
+        assert mix_down(time, x, given).carrier == pytest.approx(4400.05, abs=0.1)
+    for given in (3000.0, 99.0):
+        with pytest.raises(CompensationError, match=f"within 25 % of the {given:g} Hz given; their largest is at 50"):
+            mix_down(time, x, given)
 
 
 @pytest.mark.parametrize("part", [0.0, 0.6, 0.72, 0.8])
