@@ -172,7 +172,8 @@ SEARCHES: Mapping[str, Callable[..., dict[str, Any]]] = {"worst-case": find_wors
 def _starts(free: Sequence[StudyParameter]) -> Array:
     """Return the middle and the corners of the unit box; with many parameters the middles of its faces instead."""
     d = len(free)
-    middle = np.array([(float(p.nominal) - p.low) / (p.high - p.low) for p in free])
+    widths = [(p.high - p.low) or 1.0 for p in free]  # or 1: of one that does not vary
+    middle = np.array([(float(p.nominal) - p.low) / width for p, width in zip(free, widths, strict=True)])
     if d <= MOST_CORNERS:
         return np.array([middle, *(np.array(corner) for corner in product((0.0, 1.0), repeat=d))])
     faces = [np.where(np.arange(d) == k, end, middle) for k in range(d) for end in (0.0, 1.0)]

@@ -144,11 +144,12 @@ def test_worst_case(tmp_path, functions):
         "quantity": [{"name": "python", "function": f"{functions}:bowl"}],
         "search": [{"kind": "worst-case", "column": "bowl"}],
     }
+    spec["parameter"].append({"name": "user.z", "values": [0.7], "nominal": 0.7})  # does not vary
     results = run_study(spec, workers=1, allow_python=True)
     worst = results.store.findings[name_search(results.study.searches[0])]
     assert worst["least"]["value"] == pytest.approx(0, abs=1e-4)  # inside the box, where no corner is
     assert worst["greatest"]["value"] == pytest.approx(1.3**2 + 1.2**2, rel=1e-12)
-    assert worst["greatest"]["parameters"] == {"user.x": -1.0, "user.y": 1.0}
+    assert worst["greatest"]["parameters"] == {"user.x": -1.0, "user.y": 1.0, "user.z": 0.7}
 
 
 @pytest.mark.slow
