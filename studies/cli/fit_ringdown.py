@@ -90,7 +90,7 @@ def fit_ringdown(
     return Result(
         {
             "decays": rows,
-            "laws": {name: _law_row(name, law) for name, law in laws.items()},
+            "laws": {name: _law_row(name, law, table) for name, law in laws.items()},
             "saved": save,
         },
         "Ring-down",
@@ -156,12 +156,15 @@ TITLES = {"frequency_Hz": "Frequency", "inverse_q": "1/Q"}
 TERM = "words: depends on | shown ± shown_sd: value | shown_low … shown_high ± shown_sd: 90 % interval | shown_unit: unit"  # fmt: skip
 
 
-def _law_row(name: str, law: Law) -> dict[str, Any]:
-    """Return a law for --json: relative values of a frequency (1 = the frequency itself), plain ones of 1/Q."""
+def _law_row(name: str, law: Law, decays: Decays) -> dict[str, Any]:
+    """Return a law for --json: relative values of a frequency (1 = the frequency itself), plain ones of 1/Q; the level at the mean temperature."""
     level = float(np.exp(law.level.value)) if name == "frequency_Hz" else law.level.value
+    used = np.isfinite(law.fitted)
+    at = float(np.mean(decays.columns[WORDS["temperature"][2]][used])) if "temperature" in law.terms else None
     return {
         "level": level,
         "level_sd": law.level.sd * (level if name == "frequency_Hz" else 1),
+        "level_temperature_degC": at,
         "terms": [{"term": term} | row_of(one, "value", "sd", "low", "high") for term, one in law.terms.items()],
         **row_of(law, "scatter", sessions_s="sessions", left_out_rows="left_out"),
     }
@@ -170,11 +173,13 @@ def _law_row(name: str, law: Law) -> dict[str, Any]:
 def _law_chapter(laws: dict[str, Law], decays: Decays) -> Chapter:
     parts: list[Part] = []
     for name, law in laws.items():
+        row = _law_row(name, law, decays)
+        at = f" at {row['level_temperature_degC']:.4g} °C" if "temperature" in law.terms else ""
         if name == "frequency_Hz":
-            note = f"Level: {_law_row(name, law)['level']:.10g} Hz. Scatter: {1e6 * law.scatter:.3g} ppm."
+            note = f"Level{at}: {row['level']:.10g} Hz. Scatter: {1e6 * law.scatter:.3g} ppm."
         else:
             level = " ± ".join(to_error(law.level.value, law.level.sd))
-            note = f"1/Q without these: {level}. Scatter: {100 * law.scatter:.2g} %."
+            note = f"1/Q without these{at and ',' + at}: {level}. Scatter: {100 * law.scatter:.2g} %."
         rows, over = [_shown(name, term, law) for term in law.terms], f"{TITLES[name]} over many decays"
         if not rows:
             parts.append(f"{over}: no condition explains it, nor does time. {note}")

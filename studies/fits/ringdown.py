@@ -84,7 +84,7 @@ def read_decay(
     aliased: tuple[str, ...] = ()
     with naming(path):
         if power is not None:
-            return _told(path, notes, analyse_trace(time, np.sqrt(power), reference))
+            return _told(path, notes, analyse_trace(time, np.sqrt(np.maximum(power, 0.0)), reference))
         raw = [columns[name] for name in RAW if name in columns]
         if raw:
             envelope, rate = mix_down(time, np.array(raw), reference), 1 / even_rows(time)[0]
@@ -138,6 +138,8 @@ def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
     if len(table.values) < 2:
         needs = f"{RAW[0]}, {POLAR[0][0]} with {POLAR[0][1]}, or {POWERS[0]} beside it"
         raise InputError(f"{path}: only time_s; a decay needs {needs}.")
+    if empty := [name for name, x in table.values.items() if np.isnan(x).all()]:
+        raise InputError(f"{path}: the column '{empty[0]}' has no value; take it out, or record it.")
     notes = _read_start(path, table.comments)
     for comment in table.comments:
         if match := NOTE.match(comment):

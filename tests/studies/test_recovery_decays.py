@@ -49,6 +49,8 @@ def test_a_pendulum_that_is_solved_exactly_follows_the_printed_law(tmp_path, ask
         "frequency_Hz"
     ]
     assert law["left_out_rows"] == 3
+    true = 1 / (3.3735 * (1 + alpha / 2 * (law["level_temperature_degC"] - 19)))
+    assert law["level"] == pytest.approx(true, abs=4 * law["level_sd"])
     # the next term of the series, 11/3072 θ⁴, is −0.0003 here
     assert law["energy"]["value"] == pytest.approx(-1 / 16, abs=0.003)
     assert abs(law["temperature"]["value"] + alpha / 2) < 3 * law["temperature"]["sd"] < 1e-5

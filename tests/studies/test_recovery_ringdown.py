@@ -135,6 +135,8 @@ def test_a_spectrum_analysers_trace(tmp_path, ask, name):
         ({"time_s": TIME, "power_dBm": 0 * TIME + np.sin(TIME)}, "nothing decays"),
         ({"time_s": TIME[:10], "power_dBm": -TIME[:10]}, "32 rows"),
         ({"time_s": TIME, "voltage": TIME}, "voltage"),
+        ({"time_s": TIME, "power_W": -np.exp(-TIME)}, "32 rows or more with a positive amplitude, not 0"),
+        ({"time_s": TIME, "pickoff_cos_V": np.nan * TIME}, "the column 'pickoff_cos_V' has no value"),
         ({"frequency_Hz": TIME + 1, "power_dBm": 0 * TIME}, "no resonance"),
         ({"frequency_Hz": TIME[::-1] + 1, "power_dBm": TIME}, "does not increase"),
     ],
