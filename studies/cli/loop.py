@@ -35,7 +35,7 @@ def loop(
     row: Annotated[float | None, POSITIVE] = None,
     profile: str | None = None,
     both_ways: bool = False,
-    seed: Seed = 0,
+    seed: Seed | None = None,
     noiseless: bool = False,
 ) -> Result:
     """Analyze the control loops of a card: stability margins, bias and noise by source, start-up; --out adds a simulated run.
@@ -63,7 +63,14 @@ def loop(
             f"{instrument.path}: --both-ways reverses the self-precession of a whole-angle wave; the card's [loop] has mode"
             f' "{keys.mode}" and self_precession_deg_per_s = {keys.self_precession_deg_per_s:g}. Leave --both-ways out, or set both keys.'
         )
-    given = {"hours": hours, "row": row, "profile": profile, "both-ways": both_ways, "noiseless": noiseless}
+    given = {
+        "hours": hours,
+        "row": row,
+        "profile": profile,
+        "both-ways": both_ways,
+        "seed": seed,
+        "noiseless": noiseless,
+    }
     _check_run([name for name, value in given.items() if value not in (None, False)], out, hours, row)
     reference = instrument.reference_temperature
     law = law_of(instrument, min(T, reference) - 5, max(T, reference) + 5)
@@ -75,7 +82,7 @@ def loop(
         say(f"state space: {state_space}")
     run = None
     if out is not None:
-        drawn = None if noiseless else seed
+        drawn = None if noiseless else seed or 0
         run = _run(study, T, out, hours or 1.0, row or 1.0, rate, profile, both_ways, drawn)
     payload = {
         "card": instrument.name,

@@ -28,7 +28,7 @@ def twin(
     *,
     fmu: str | None = None,
     c: str | None = None,
-    fmi: Literal["2.0", "3.0"] = "3.0",
+    fmi: Literal["2.0", "3.0"] | None = None,
     boundary: Literal["chamber", "housing"] = "chamber",
     theory: Theory = "solid",
 ) -> Result:
@@ -42,13 +42,16 @@ def twin(
     Args:
         fmu: The FMU to write, with sources, and a binary for 64-bit Linux if there is a compiler (CC, cc or gcc).
         c: Folder for the C sources. main.c runs a profile (CSV): cc -std=c11 -O2 *.c -lm -o twin
-        fmi: Version of the FMU.
+        fmi: Version of the FMU; 3.0 unless given.
         boundary: Input temperature: that of the chamber, or of the housing itself, ahead of its sensor. Without its slope it is held over a step.
     """
     if fmu is not None:
         ending_of(fmu, (".fmu",), "--fmu")
     if fmu is None and c is None:
         raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")
+    if fmi is not None and fmu is None:
+        raise InputError(f"--fmi {fmi}: the version of an FMU; add --fmu FILE.fmu, or leave it out.")
+    fmi = fmi or "3.0"
     plan = plan_twin(load_card(card), boundary, theory)
     reach = np.array([plan.constants["LOWEST"], plan.constants["HIGHEST"]])
     beyond = beyond_records(plan.instrument, reach, "this twin")

@@ -4,9 +4,11 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, reduce
 from pathlib import Path
 from typing import Any
+
+from msgspec import NODEFAULT, inspect
 
 from studies.errors import InputError, nearest
 from studies.instrument.uncertain import Given, UncertainValue, read_uncertain
@@ -149,17 +151,29 @@ def possible_keys(content: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
         raw = content.get(table) or {}
         for entry in entries if isinstance(raw, Mapping) else ():
             if entry.keys is not None:
-                found |= _names(describe(entry.keys), raw, table)
+                found |= {name: bounds(one.type) for name, one in _fields(describe(entry.keys), raw, table)}
     return found
 
 
-def _names(node: Any, raw: Any, before: str) -> Iterable[tuple[str, tuple[float, float]]]:
+def default_keys(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the defaults of the keys in the tables that this card has, by their dotted names."""
+    found: dict[str, Any] = {}
+    for table, raw in content.items():
+        for entry in card_tables().get(table, ()) if isinstance(raw, Mapping) else ():
+            for name, one in _fields(describe(entry.keys), raw, table):
+                inside = name.count(".") == 1 or reduce(lambda at, key: at.get(key, {}), name.split(".")[1:-1], raw)
+                if inside and not one.required and one.default not in (NODEFAULT, None):
+                    found[name] = one.default
+    return found
+
+
+def _fields(node: Any, raw: Any, before: str) -> Iterable[tuple[str, inspect.Field]]:
     for struct in structs(node, raw):
         for field in struct.fields:
             name = f"{before}.{field.encode_name}"
             inner = raw.get(field.encode_name) if isinstance(raw, Mapping) else None
             below = structs(field.type)
             if holds_value(field.type):
-                yield name, bounds(field.type)
+                yield name, field
             elif inner is not None or not any(one.required for table in below for one in table.fields):
-                yield from _names(field.type, inner, name)
+                yield from _fields(field.type, inner, name)

@@ -8,6 +8,7 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
+from studies.instrument.registry import default_keys
 from studies.progress import told
 from studies.resonator.law import law_of
 from studies.results.shown import Shown
@@ -36,7 +37,7 @@ class Figure:
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Shown):
-    """Designs and their figures, in one order; `differing` card keys with their values (None: not in that card)."""
+    """Designs and their figures, in one order; `differing` card keys with their values, by default or given (None: not in that card)."""
 
     names: tuple[str, ...]
     figures: tuple[tuple[Figure, ...], ...]
@@ -62,7 +63,8 @@ def compare(instruments: "Sequence[Instrument]") -> Comparison:
     """Compute the figures of designs and find the keys in which their cards differ."""
     keys = [{REFERENCE: one.reference_temperature - zero_Celsius, **dict(_flatten(one.content))} for one in instruments]
     names = dict.fromkeys(name for one in keys for name in one)
-    differing = {name: tuple(one.get(name) for one in keys) for name in names}
+    known = [default_keys(one.content) | stated for one, stated in zip(instruments, keys, strict=True)]
+    differing = {name: tuple(one.get(name) for one in known) for name in names}
     return Comparison(
         tuple(one.name for one in instruments),
         tuple(zip(*(tuple(_figures(one)) for one in told(instruments, "designs")), strict=True)),

@@ -9,6 +9,10 @@ def test_figures_are_those_of_the_other_commands(tmp_path, ask):
         'schema = "hrg.card/1"\nname = "thin"\n[resonator]\nshape = "hemisphere"\nradius_mm = 15.0\nthickness_mm = 0.8\n'
         '[material]\nname = "fused-silica"\n'
     )
+    other = tmp_path / "said.toml"  # with a default that it states
+    other.write_text(card.read_text().replace("[material]", 'support = "free"\n[material]'))
+    assert not ask(["compare", str(card), str(other)])["differing"]
+    assert ask(["compare", "hrg-30mm", str(card)])["differing"]["resonator.support"] == ["stem", "free"]
     found = ask(["compare", "free-dome", str(card)])
     assert (found["schema"], found["cards"]) == ("hrg.compare/1", ["free-dome", "thin"])
     assert found["differing"] == {"resonator.thickness_mm": [0.9, 0.8]}

@@ -98,6 +98,8 @@ REFUSED = {
     "loop hrg-30mm-loops --hours inf --out run.csv": "--hours",
     "loop hrg-30mm-loops --profile 'soak 20 1h'": "--profile: only for a simulated run",
     "loop hrg-30mm-loops --row 10 --noiseless": "--row, --noiseless: only for a simulated run",
+    "loop hrg-30mm-loops --seed 3": "--seed: only for a simulated run",
+    "twin free-dome --c folder --fmi 2.0": "--fmi 2.0: the version of an FMU; add --fmu FILE.fmu",
     "loop hrg-30mm-loops --seed -1 --out run.csv": "--seed",
     "loss free-dome --from -100 --to 20": "outside the range",
     "loss free-dome --from 30 --to 20": "hrg: ",

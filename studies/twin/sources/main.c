@@ -1,4 +1,4 @@
-/* twin PROFILE.csv RECORD.csv [row=1] [seed=0 | noiseless] [full]: a run through a profile, row by row.
+/* twin PROFILE.csv RECORD.csv [ROW [{SEED | noiseless} [full]]]: a run through a profile, row by row.
  *
  * The profile has the columns time_s and chamber_temperature_degC (housing_temperature_degC where the card was carried for
  * it), linear between its rows, and any of drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg and
@@ -259,7 +259,7 @@ int main(int argc, char **argv) {
     const size_t digits = noise && argc > 4 ? strspn(argv[4], "0123456789") : 1;
     const int said = argc < 3 || argc > 6 || (end && (end == argv[3] || *end)) || !(row > 0) || !isfinite(row) || digits < 1 || digits > 15
                      || (noise && argc > 4 && argv[4][digits]) || (full && strcmp(argv[5], "full"));
-    if (said) return fprintf(stderr, "usage: twin PROFILE.csv RECORD.csv [row=1] [seed=0 | noiseless] [full]; row: seconds, seed: a whole number\n"), 2;
+    if (said) return fprintf(stderr, "usage: twin PROFILE.csv RECORD.csv [ROW [{SEED | noiseless} [full]]]; ROW: seconds, 1 unless given; SEED: a whole number, 0 unless given\n"), 2;
     Twin *twin = malloc(sizeof *twin);
     int status = twin ? load(argv[1], &profile) : 2;
     if (!status && TWIN_FREE && profile.has[FIRST_COMMAND + IN_ANGLE])
