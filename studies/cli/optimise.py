@@ -18,7 +18,8 @@ from studies.reports import style
 from studies.reports.digits import plain
 from studies.reports.scenes import moving_mode, show_mode
 from studies.reports.sweep_figures import column_label
-from studies.results import Blocks, Chapter, Column, Drawing, Facts, Figure, Result, Table, row_of
+from studies.results import Blocks, Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
+from studies.sweeps.tolerance import tell_doubt
 
 
 @answers("hrg.optimise/1")
@@ -42,6 +43,7 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
         "columns": _columns(found),
         "constraints": [
             row_of(one, "column", "limit", "value", "room", "margin", "price")
+            | {"error": float(found.errors[found.place(one.column)])}
             | {"kind": "most" if one.sign > 0 else "least", "active": one.price is not None}
             for one in found.limits
         ],
@@ -102,12 +104,18 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         if all(not abs(row["verified"] - row["best"]) > 1e-9 * abs(row["best"]) for row in payload["columns"])
         else " The solve from the card differs: see the table."
     )
+    doubts = [
+        tell_doubt(label[name], unit[name].strip(), shown(name, found.after[k]), float(found.errors[k]), limits)
+        for name in dict.fromkeys(one.column for one in found.task.keys.constraint if not one.is_relative)
+        for k, limits in [(found.place(name), [one.limit for one in found.limits if one.column == name])]
+    ]
     keys = found.task.study.names[: found.task.free]
     front = [Column(itemgetter(name), name.removeprefix("resonator."), digits=5) for name in keys]
     front += [Column(itemgetter(name), named[name], digits=6) for name in found.task.wanted]
     return [
         Chapter("The design", [
             Facts(facts),
+            *(Sentence(one, "warning") for one in doubts if one),
             f"{payload['best_card']} is the best design as a card; {TABLE} beside it has all {found.evaluations} designs.{words}",
             Table("Parameters", payload["parameters"], [
                 Column(lambda row: row["name"].removeprefix("resonator."), "parameter"),

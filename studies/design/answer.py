@@ -60,7 +60,9 @@ class Answer:
     best: Array
     after: Array
     foretold: Array
-    verified: Array  # the columns of the best design, solved once more from its card
+    # verified, errors: the columns of the best design, solved once more from its card, and their own errors (NaN: not known)
+    verified: Array
+    errors: Array
     limits: tuple[Limit, ...]
     spreads: tuple[Spread, ...]
     # (designs, parameters) and front_values, from the best in the first objective on; single rows where one is asked.
@@ -115,6 +117,7 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
         values,
         foretold,
         row.values,
+        row.errors,
         limits,
         spreads,
         search.low + search.x[front] * search.width,

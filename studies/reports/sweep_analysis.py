@@ -1,6 +1,6 @@
 """Chapters on what a study means: which parameter matters, the yield, worst cases."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from studies.sweeps.quantity import Column as Output
 from studies.sweeps.results import Results
 from studies.sweeps.search import name_search
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
-from studies.sweeps.tolerance import Yield, find_yield, resolve_limits
+from studies.sweeps.tolerance import Yield, find_yield, resolve_limits, tell_doubt
 
 SOBOL = "Parameter | first: First order .4f | first_low … first_high: 90 % interval .4f | total: Total .4f | total_low … total_high: 90 % interval .4f"
 SHARES = "Parameter | slope ± half_width: Slope | Unit | share: Share of variance (%) ×100 .2f"
@@ -101,7 +101,18 @@ def tolerance_parts(results: Results) -> list[Part]:
     except InputError as error:
         return [Sentence(str(error), "warning")]
     note = "In the interval, a design without a result counts as failed at the lower end, passed at the upper."
-    return [*search_parts(results, "tolerance"), Table("Yield", rows, YIELD, note)]
+    doubts = (Sentence(one, "warning") for one in _doubts(results) if one)
+    return [*search_parts(results, "tolerance"), Table("Yield", rows, YIELD, note), *doubts]
+
+
+def _doubts(results: Results) -> Iterator[str]:
+    """Yield which limits are nearer to the nominal design than its own error; those about its value share that."""
+    columns = {column.name: (k, column) for k, column in enumerate(results.study.columns)}
+    for asked in results.study.requirements:
+        (k, column), nominal = columns[asked.column], results.nominal
+        if nominal is not None and not asked.is_relative:
+            value, error, limits = nominal.values[k], nominal.errors[k], resolve_limits(results, asked)[1:]
+            yield tell_doubt(column.label, column.unit, float(value), float(error), limits)
 
 
 def _end(value: float) -> float | None:

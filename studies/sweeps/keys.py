@@ -112,6 +112,11 @@ class Requirement(Keys, frozen=True, kw_only=True):
         if self.low is not None and self.high is not None and not self.low < self.high:
             raise ValueError(f"low must be below high for '{self.column}', not {self.low:g} and {self.high:g}.")
 
+    @property
+    def is_relative(self) -> bool:
+        """Whether the limits are about the nominal design's value, and share its error."""
+        return self.within is not None and self.target is None
+
     def limits(self, nominal: float) -> tuple[float, float]:
         """Return the lowest and the highest value, infinite where an end is open; `nominal`: the nominal design's value."""
         if self.within is None:

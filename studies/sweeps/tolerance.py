@@ -1,5 +1,6 @@
 """How many designs meet their requirements, with an interval, and how far values lie on the way to their limits."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,6 +18,21 @@ class RequirementLimits(NamedTuple):
     column: str
     low: float
     high: float
+
+
+COUNTS = 1e-3  # of a value: an error below it is that of a solve that was asked for so
+
+
+def tell_doubt(label: str, unit: str, value: float, error: float, limits: Sequence[float]) -> str:
+    """Say where the own error of a value, of its theory or its solve, exceeds the distance to the nearest of its limits."""
+    near = min(limits, key=lambda limit: abs(limit - value))
+    if not error > max(abs(near - value), COUNTS * abs(value)):
+        return ""
+    unit = "" if unit in ("", "1") else f" {unit}"
+    return (
+        f"{label}: {value:.6g}{unit}, known to ± {error:.4g}{unit} by its theory and solve; its limit {near:.6g} is {abs(near - value):.3g} away, so that"
+        ' it may not be kept. Ask for theory = "solid", or a finer tolerance, in its [[quantity]].'
+    )
 
 
 @dataclass(frozen=True)

@@ -200,10 +200,14 @@ def test_recovery_robust_dome(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_planted_the_closed_form_can_be_wanted(tmp_path):
+def test_planted_the_closed_form_can_be_wanted(tmp_path, capsys):
     """Frequency as h/R², mass as R² h: the lightest has the least radius, and the least step of the wall that keeps the limit."""
-    found = optimise(write(tmp_path, TASK.replace('"shell"', '"rayleigh"')), workers=1)
+    task, out = write(tmp_path, TASK.replace('"shell"', '"rayleigh"')), str(tmp_path / "out")
+    found = optimise(task, out, workers=1)
     wall = 5000 / found.before[0] * 0.9 * (12 / 15) ** 2
     assert wall < found.best[0] < wall + 0.01
     assert found.best[1] == pytest.approx(12)
     assert found.after == pytest.approx(found.verified, rel=1e-12)
+    assert main(["optimise", task, "--out", out, "--workers", "1"]) == 0
+    error = found.errors[found.place("frequency_n2_Hz")]  # against shell theory
+    assert f"known to ± {error:.4g} Hz by its theory and solve" in " ".join(capsys.readouterr().out.split())

@@ -23,6 +23,7 @@ def ask(posed):
     class Row:
         def __init__(self, named):
             self.values = explorer.function(list(named.values()))
+            self.errors = np.full(len(self.values), np.nan)
 
     return answer(task, explorer, Row)
 

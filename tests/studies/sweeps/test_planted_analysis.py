@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from studies.errors import InputError
+from studies.reports.sweep_analysis import tolerance_parts
+from studies.results import Sentence
 from studies.sweeps.run import run_study
 from studies.sweeps.search import name_search
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
@@ -133,6 +135,25 @@ def test_yield_counts_unknown_designs_both_ways(tmp_path, functions):
     assert found.share == pytest.approx(2 / 3)
     assert found.low < 0.5
     assert found.high > 0.75
+
+
+def test_a_limit_nearer_than_the_own_error_of_a_theory_is_told():
+    """Rayleigh's frequency of the dome is some 10 % high; what is asked about that very value shares the error."""
+    column = "frequency_n2_Hz"
+    spec = {
+        "card": "free-dome",
+        "sampling": {"method": "list"},
+        "parameter": [{"name": "resonator.thickness_mm", "values": [0.9]}],
+        "quantity": [{"name": "frequency", "theory": "rayleigh"}],
+        "requirement": [
+            {"column": column, "low": 4900},
+            {"column": column, "within": 5},
+            {"column": column, "low": 1000},
+        ],
+    }
+    told = [one.text for one in tolerance_parts(run_study(spec, workers=1)) if isinstance(one, Sentence)]
+    assert len(told) == 1
+    assert "by its theory and solve; its limit 4900 is" in told[0]
 
 
 def test_worst_case(tmp_path, functions):
