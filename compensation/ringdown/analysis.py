@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from compensation.arrays import Complex
+from compensation.arrays import Array, Complex
 from compensation.constants import NINETY
 from compensation.errors import CompensationError
 from compensation.ringdown.answer import Curve, Estimate, RingDown
@@ -62,11 +62,15 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2) -> RingDown:
     remarks = (*turning, *_remark(given, fit, left, jump, lines), *_undetermined(fit, estimates))
     time = fit.envelope.time
     curves = tuple(
-        Curve(time, 20 * np.log10(np.abs(z)), 20 * np.log10(np.abs(z - r)), np.real(r))
+        Curve(time, _level_dB(z), _level_dB(z - r), np.real(r))
         for z, r in zip(fit.envelope.values, fit.residual, strict=True)
     )
     window = (float(time[0]), float(time[-1]))
     return RingDown(estimates, remarks, tuple(fit.noise.tolist()), fit.widening, curves, window, lines)
+
+
+def _level_dB(z: Complex) -> Array:
+    return np.asarray(20 * np.log10(np.where(z == 0, np.nan, np.abs(z))))  # 0: a model below the rounding of the noise
 
 
 def _turning(fit: DecayFit, harmonic: int) -> tuple[str, ...]:

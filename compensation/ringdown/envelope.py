@@ -17,6 +17,7 @@ from compensation.errors import CompensationError
 LEAST = 16  # amplitudes of a decay
 MOST_BLOCKS = 4096
 CHUNK = 1 << 18
+LENGTHS = (1 << 12, 1 << 15, CHUNK)  # of rows in which the line is looked for: a decay may be short in its record
 PASSES = 3  # each takes the image out as the amplitudes of the one before change within the blocks
 WRITTEN = 0.75  # of the last digit by which the times of an even grid may be off: half of it, and the error of the line of all times
 FEWEST, APART = 12, 20  # samples of a block; steps from which a distance between samples is a gap
@@ -69,28 +70,33 @@ class Envelope:
 def find_carrier(samples: ArrayLike, rows: NDArray[np.int64], rate: float, about: float | None = None) -> float:
     """Return the frequency (Hz) of the largest line of raw samples that stand at, or near, the `rows` of an even grid.
 
-    Strongest 2¹⁸ rows, Hann window, parabola of the log; a lost row counts as zero. A frequency `about` that of the line says
-    in which zone of half the rate it is, and which line is meant: the nearer a line, the more its power counts.
+    Of the strongest rows of several lengths those in which it stands highest above the median; Hann window, parabola of the log;
+    a lost row counts as zero. A frequency `about` that of the line says in which zone of half the rate it is, and which line is
+    meant: the nearer a line, the more its power counts.
     """
     x = np.asarray(samples, dtype=np.float64)
     x = x - np.mean(x)
-    length = min(int(rows[-1]) + 1, CHUNK)
-    at = int(np.argmax(np.bincount(rows // length, x**2)))
-    power = _spectrum(x, rows, at * length, length)
+    seen = 0.0 if about is None else alias_of(about, rate)
 
-    def line(weight: Array) -> tuple[int, float]:
-        peak = int(np.argmax((weight * power)[1:-1])) + 1
+    def look(length: int, about: float | None) -> tuple[float, float, float]:
+        """Return what a line counts, its power over the median, and its frequency (Hz)."""
+        at = int(np.argmax(np.bincount(rows // length, x**2)))
+        power = _spectrum(x, rows, at * length, length)
+        power /= np.median(power) + 1e-300
+        away = np.arange(power.size) * rate / length - seen
+        counts = power if about is None else power / (1 + (away / (NEAR * about)) ** 2)
+        peak = int(np.argmax(counts[1:-1])) + 1
         left, middle, right = 0.5 * np.log(power[peak - 1 : peak + 2] + 1e-300)
         curve = left - 2 * middle + right
-        return peak, float((peak + (0.5 * (left - right) / curve if curve else 0.0)) * rate / length)
+        place = peak + (0.5 * (left - right) / curve if curve else 0.0)
+        return float(counts[peak]), float(power[peak]), float(place * rate / length)
 
+    lengths = sorted({min(int(rows[-1]) + 1, length) for length in LENGTHS})
+    _, above, found = max(look(length, about) for length in lengths)
     if about is None:
-        return line(np.ones_like(power))[1]
-    seen = alias_of(about, rate)
-    away = np.abs(np.arange(power.size) * rate / length - seen)
-    peak, found = line(1 / (1 + (away / (NEAR * about)) ** 2))
-    if away[peak] > OFF * about or power[peak] < ABOVE * np.median(power):
-        largest = line(np.ones_like(power))[1]
+        return found
+    if abs(found - seen) > OFF * about or above < ABOVE:
+        *_, largest = max(look(length, None) for length in lengths)
         raise CompensationError(
             f"no line of the samples is within {100 * OFF:g} % of the {about:.6g} Hz given; their largest is at {largest:.6g} Hz."
             " Correct or leave out --frequency, or the reference in the file."

@@ -475,6 +475,19 @@ def test_a_frequency_given_off_the_line_says_in_which_zone_it_is(line):
     assert not found.interference
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("given", [None, 5000.0])
+def test_the_line_of_a_decay_that_is_short_in_its_record_is_found(given):
+    """A window over 2.6 s left nothing of 0.05 s at its beginning: a line of the noise was taken, and nothing decayed."""
+    time = np.arange(260_000) / 1e5
+    x = np.exp(-time / 0.05) * np.cos(2 * np.pi * 5003 * time) + 0.2 * np.random.default_rng(0).standard_normal(
+        time.size
+    )
+    found = analyse_decay(mix_down(time, x, given)).estimates
+    assert abs(found["frequency_Hz"].value - 5003) < 4 * found["frequency_Hz"].sd < 0.2
+    assert abs(found["decay_time_s"].value - 0.05) < 4 * found["decay_time_s"].sd < 5e-3
+
+
 def test_a_frequency_given_that_is_of_no_line_is_refused_and_another_line_is_not_taken():
     random, time = np.random.default_rng(1), np.arange(40_000) / 11_025
     x = Gyro(4400.0, 4400.12, 3e4, 3.3e4, 0.3, 0.3).samples(time, [1.0, 0.7]) + 2e-3 * random.standard_normal(
