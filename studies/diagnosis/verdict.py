@@ -225,13 +225,18 @@ def doubted(causes: Sequence[Cause]) -> tuple[Cause, ...]:
     may only patch the first.
     """
     first = next((cause for cause in causes if cause.kind == "physics"), None)
-    share = {True: CONSTANTS["doubt"], False: CONSTANTS["doubt_further"]}
     one = first is not None and first.together
     alike = [cause is first or cause.kind == "value" or (cause.together and one) for cause in causes]
     return tuple(
-        replace(cause, probability=cause.probability * (1.0 - share[one]))
+        replace(cause, probability=cause.probability * (1.0 - share_wrong(cause.evidence, not one)))
         for cause, one in zip(causes, alike, strict=True)
     )
+
+
+def share_wrong(evidence: float, further: bool) -> float:
+    """Return the probability that a name is wrong for reasons outside the likelihood: the less, the more evidence it has."""
+    usual = scipy.special.logit(CONSTANTS["doubt"]) - CONSTANTS["doubt_falls"] * np.log(max(evidence, 1.0) / 100.0)
+    return float(scipy.special.expit(usual + further * np.log(CONSTANTS["doubt_further"])))
 
 
 def temper_of(lead: float) -> float:

@@ -10,7 +10,7 @@ from compensation.arrays import Array
 from compensation.constants import NINETY
 from studies.calibration.noise_levels import has_levels
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.verdict import Cause, Interval, same_cause, weigh
+from studies.diagnosis.verdict import Cause, Interval, share_wrong, same_cause, weigh
 from studies.effects import library
 from studies.effects.effect import UNITS
 from studies.inference.background import Background
@@ -94,10 +94,11 @@ def candidates_of(found: Inferred, name: str) -> list[Cause]:
     apart = with_levels(found.search, found.final, name).score - found.final.score
     unknown = max(found.left[name].evidence + CONSTANTS["log_prior_unknown"], apart)
     (first, *others), probability = weigh(list(best), list(best.values()), 0.0, unknown)
-    probability *= 1.0 - CONSTANTS["doubt_further"]
+    evidence = 2.0 * max(best[first], 0.0)
+    probability *= 1.0 - share_wrong(evidence, True)
     if probability < CONSTANTS["member"]:
         return []
-    return [Cause(first, name, probability, tuple(sorted(others)), {}, 2.0 * max(best[first], 0.0))]
+    return [Cause(first, name, probability, tuple(sorted(others)), {}, evidence)]
 
 
 def _shape_of(term: Term) -> dict[str, Interval]:

@@ -67,7 +67,7 @@ def _judge(
 ) -> tuple[str, str]:
     left, apart = found.left[name], _apart(found, name)
     clean = share is None or share >= CONSTANTS["share_explained"]
-    patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]
+    patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]  # rather wrong than right
     if left.significant and (share is None or not clean or patched):
         return "unexplained", apart
     if apart and not terms and not mine and found.card.polynomial is not None:
@@ -78,7 +78,7 @@ def _judge(
             " distinguish slow noise from a cause that acts slowly"
         ) + (apart and f"; {apart}")
     if terms or mine:
-        return ("not-identifiable" if any(cause.equivalent for cause in mine) else "explained"), apart
+        return ("not-identifiable" if patched or any(cause.equivalent for cause in mine) else "explained"), apart
     if values:
         return "explained", apart
     paths = found.search.signatures.paths

@@ -37,10 +37,10 @@ def judge(found: Inferred) -> Verdict:
     shifts = shifts_of(found.background) if found.card.polynomial is None else []
     if found.path is not None:  # no card said anything of its mass
         shifts = [one for one in shifts if one.parameter not in MASS]
-    causes = tuple(sorted((*wrong_values(shifts), *causes_of(found)), key=lambda cause: -cause.evidence))
+    causes = doubted(sorted((*wrong_values(shifts), *causes_of(found)), key=lambda cause: -cause.evidence))
     results = {name: result_of(found, name, causes) for name in found.search.linear.responses}
     results |= skipped_results(found.campaign)
-    doubtful = _patching(found, doubted(causes), results)
+    doubtful = _patching(found, causes, results)
     named = tuple(one for one in doubtful if one.kind == "value" or one.probability >= CONSTANTS["member"])
     told = {cause.response for cause in named}
     for name in found.search.linear.responses:
