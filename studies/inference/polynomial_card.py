@@ -47,8 +47,7 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> Instrument:
     x0, reach = reference + zero_Celsius, max(0.5 * float(np.ptp(housing)), 1e-2)
     by_chamber = runs[0].inner.boundary == "chamber"
     thermometers = [column for column in POWERS if any(column in run.responses for run in runs)]
-    thermometer = thermometers[0]
-    tau = _likeliest_lag(runs, thermometer, x0)
+    tau = _likeliest_lag(runs, thermometers[:1] if thermometers[0] == "frequency_Hz" else thermometers, x0)
     law: dict[str, Any] = {
         "f0_Hz": _exact(1.0 / PER_KELVIN),
         "a1_per_K": _exact(PER_KELVIN),
@@ -159,13 +158,17 @@ def _fit(runs: Sequence[ObservedRun], column: str, tau: float, x0: float, apart:
     return found / size, float(np.sum((target - whole @ found) ** 2))
 
 
-def _likeliest_lag(runs: Sequence[ObservedRun], column: str, x0: float) -> float:
+def _likeliest_lag(runs: Sequence[ObservedRun], columns: Sequence[str], x0: float) -> float:
+    """Return the lag behind which the columns, each in noise of its own, are likeliest: an effect in one of them is none in the others."""
     longest = max(float(np.ptp(run.inner.time)) for run in runs)
-    most = 1e5 if column == "frequency_Hz" else max(OF_RUN * longest, float(LAGS[1]))
+    most = 1e5 if "frequency_Hz" in columns else max(OF_RUN * longest, float(LAGS[1]))
+
+    counts = np.array([sum(len(r.responses[c].value) for r in runs if c in r.responses) for c in columns])
 
     def left(logarithm: float) -> float:
         unusual = (logarithm - np.log(USUAL_LAG)) / USUAL_SPREAD
-        return _fit(runs, column, float(np.exp(logarithm)), x0, True)[1] + float(unusual) ** 2
+        rest = [_fit(runs, column, float(np.exp(logarithm)), x0, True)[1] for column in columns]
+        return (rest[0] if len(rest) == 1 else float(counts @ np.log(rest))) + float(unusual) ** 2
 
     grid = np.log(LAGS[LAGS <= most])
     seen = np.array([left(one) for one in grid])

@@ -155,4 +155,4 @@ def test_the_deeper_of_two_valleys_is_the_lag_where_the_grid_stands_on_the_wall_
     monkeypatch.setattr("studies.inference.polynomial_card._fit", left)
     monkeypatch.setattr("studies.inference.polynomial_card.USUAL_SPREAD", 1e6)
     run = SimpleNamespace(inner=SimpleNamespace(time=np.array([0.0, 3e4])))
-    assert _likeliest_lag([run], "frequency_Hz", 283.15) == pytest.approx(1139.0, rel=1e-3)
+    assert _likeliest_lag([run], ["frequency_Hz"], 283.15) == pytest.approx(1139.0, rel=1e-3)
