@@ -130,8 +130,7 @@ def _impose(instrument: "Instrument", drive: Drive) -> tuple[Profile, Profile]:
     if drive.boundary == "chamber" or read.jumps.size:
         return read, read
     lag = instrument.noise.housing_lag_s * slope_of_reading(read)
-    # a polynomial card follows what was read, linear between its rows
-    lines = read if instrument.polynomial is not None else of_equal_area(read)
+    lines = of_equal_area(read)
     return Profile(read.time, read.value + lag), drive.kinked(Profile(read.time, lines.value + lag))
 
 
