@@ -112,7 +112,7 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
     Where the frequency is measured, the temperature is that of the resonator, which lags as the frequency shows.
     """
     whole = sum(float(np.ptp(record["time_s"])) for record in records)
-    followed = [_follow(record, whole / MOST) for record in records if "frequency_Hz" in record]
+    followed = [_follow(record, whole / MOST) for record in records if _has(record, "frequency_Hz")]
     paths = [record.path for record in records]
     found: Found = {}
     lags, without = (0.0, 0.0), list[tuple[float, float]]()
@@ -120,13 +120,7 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
         lags, without, value, sd = slope_behind(followed)
         scale = 1e6 / float(np.mean(np.concatenate([run.output for run in followed])))
         found["frequency_temperature_slope_ppm_per_K"] = within(value, sd, paths, PARTS - 1, scale=scale)
-    courses = []
-    for record in records:
-        if output in record:
-            columns = {"output": record[output], "T": record[_temperature_of(record)]}
-            blocks = average_blocks(record["time_s"], columns, BLOCK)
-            _check_length(record, blocks.time)
-            courses.append(Course(blocks.time, blocks.columns["T"], blocks.columns["output"]))
+    courses = [_course(record, output, BLOCK) for record in records if _has(record, output)]
     if courses:
         y = np.concatenate([run.output for run in courses])
         ends = np.cumsum([0, *(len(run.time) for run in courses)])
@@ -168,11 +162,20 @@ def _check_length(record: Record, blocks: Array) -> None:
 
 def _follow(record: Record, width: float) -> Course:
     """Return the averages of a record's frequency and temperature, over `width` (s) where that is more than usual and leaves enough."""
-    columns = {"f": record["frequency_Hz"], "T": record[_temperature_of(record)]}
-    width = max(BLOCK, min(width, float(np.ptp(record["time_s"])) / FEWEST))
-    blocks = average_blocks(record["time_s"], columns, width)
+    return _course(record, "frequency_Hz", max(BLOCK, min(width, float(np.ptp(record["time_s"])) / FEWEST)))
+
+
+def _has(record: Record, column: str) -> bool:
+    return column in record and bool(np.isfinite(record[column]).any())
+
+
+def _course(record: Record, output: str, width: float) -> Course:
+    """Return averages over `width` (s) of an output and of the temperature."""
+    names = _temperature_of(record), output
+    with naming(record.path):
+        blocks = average_blocks(record["time_s"], {name: record[name] for name in names}, width)
     _check_length(record, blocks.time)
-    return Course(blocks.time, blocks.columns["T"], blocks.columns["f"])
+    return Course(blocks.time, *(blocks.columns[name] for name in names))
 
 
 def measure_scale(record: Record) -> Found:

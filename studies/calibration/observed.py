@@ -38,6 +38,7 @@ PERIOD = 90.0  # ° of azimuth, of what a turning wave of n = 2 meets
 ROWS_PER_PERIOD, BLOCKS_PER_PERIOD = 120, 6  # of that; the mean over a row is then within 1e-4 of its middle
 TURNED_MOST = 10  # times as many rows, and three times as many blocks, for waves that turn often
 LEAST_ROWS = 10
+LONGEST_HOLE = 30 * 86400.0  # s, in one run
 MOST_KINKS = 24  # of a run
 LEAST_KINK = 1e-3  # K
 THERMOMETER = 0.3  # K, error of a settled temperature that nothing else tells
@@ -179,6 +180,7 @@ def observe(
 
 
 def _observe(record: Record, start: float, named: Sequence[str], turning: bool, most: int) -> ObservedRun:
+    _check_holes(record)
     periods = _periods(record)
     fewest = min(MOST_ROWS, MOST_ROWS * most // MOST_BLOCKS)
     most_rows = int(np.clip(ROWS_PER_PERIOD * periods, fewest, TURNED_MOST * fewest))
@@ -204,6 +206,17 @@ def _observe(record: Record, start: float, named: Sequence[str], turning: bool, 
     if not any(name in responses for name in named):
         raise InputError(f"{record.path}: none of {', '.join(named)} has values; there is nothing to calibrate with.")
     return ObservedRun(record, inner, outer, responses, holes if outer is None else _find_kinks(inner, outer) | holes)
+
+
+def _check_holes(record: Record) -> None:
+    """Refuse a run whose clock leaps by more than anybody records."""
+    apart = np.diff(record["time_s"])
+    if apart.size and apart.max() > LONGEST_HOLE:
+        k = int(np.argmax(apart))
+        raise InputError(
+            f"{record.path}: time_s leaps by {apart[k] / 86400:.3g} days after {record['time_s'][k]:.6g} s (row {k + 1});"
+            " split the record there, each run a file of its own, or correct its clock."
+        )
 
 
 def _find_kinks(inner: Drive, outer: Drive) -> dict[int, float]:

@@ -36,6 +36,12 @@ MISFIT = (
     " lags: then the constants describe these records only, and the true ones may lie outside the intervals."
 )
 
+BY_THERMOMETER = (
+    "The residual wanders {:.1f} times as far as single rows scatter. The noise of the housing's readings alone makes {:.2g} Hz of it behind the lag:"
+    " average them, or take a quieter thermometer, for closer intervals."
+)
+MADE = 0.5  # part of the residual from which on the thermometer's noise is its cause
+
 
 @answers("hrg.fit-thermal/2")
 def fit_thermal(
@@ -88,10 +94,16 @@ def fit_thermal(
             Table("Thermal constants", table, columns, note),
             *(Sentence(OPEN.format(words), "warning") for words in groups),
             *(Sentence(NEGATIVE.format(NAMES[name][0]), "warning") for name in found.negative),
-            Sentence(MISFIT.format(found.slow), "warning") if found.slow > DRIFTS else None,
+            Sentence(_wanders(found), "warning") if found.slow > DRIFTS else None,
             Figure(lambda: _draw(found), "Residual of the frequency in each run."),
         ],
     )
+
+
+def _wanders(found: ThermalFit) -> str:
+    if found.by_thermometer > MADE * found.residual_rms:
+        return BY_THERMOMETER.format(found.slow, found.by_thermometer)
+    return MISFIT.format(found.slow)
 
 
 def _draw(found: ThermalFit) -> Drawing:

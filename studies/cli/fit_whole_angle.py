@@ -192,6 +192,11 @@ def _moved_by_the_middle(estimates: dict[str, dict[str, float]], other: dict[str
 def _fit_record(
     record: Record, bryan_factor: float, volts_per_hertz: float | None, card: Instrument | None, confidence: float, late: float,
 ) -> WaveFit:  # fmt: skip
+    for name in ("pattern_angle_deg", RATE, "bias_deg_per_h", "frequency_Hz", "inverse_q", "quadrature_V"):
+        if name in record and not np.isfinite(record[name]).any():
+            raise InputError(
+                f"{record.path}: {name} has no values; leave the column out, or give a record that has them."
+            )
     loop = Loop() if card is None or card.loop is None else card.loop
     applied = record.columns.get("rate_deg_per_s", 0.0)
     rate = record[RATE] if RATE in record else applied + record["bias_deg_per_h"] / 3600

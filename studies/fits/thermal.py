@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 
 from compensation.arrays import Array
+from compensation.noise import white_rms
 from studies.calibration.estimates import TOLD, find_groups
 from studies.calibration.fit import fit
 from studies.calibration.priors import from_standard
@@ -76,6 +77,14 @@ class ThermalFit:
     def slow(self) -> float:
         """Rms of slow noise within a run over that of a row: what the lags do not follow is taken for it."""
         return slow_share(self.path.fit)
+
+    @property
+    def by_thermometer(self) -> float:
+        """What the noise σ of the housing's readings, rows h apart, makes of the frequency behind the first lag: f₀a₁ σ √(h/2τ), Hz."""
+        runs, tau = self.path.fit.problem.runs, self.path.value("law.lag_s")[0]
+        read = [(white_rms(driving(run.record)), float(np.median(np.diff(run.record["time_s"])))) for run in runs]
+        slope = abs(self.path.value("law.f0_Hz")[0] * self.path.value("law.a1_per_K")[0])
+        return slope * float(np.sqrt(np.mean([sigma**2 * h / (2.0 * tau) for sigma, h in read])))
 
     @property
     def negative(self) -> list[str]:

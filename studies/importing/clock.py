@@ -182,7 +182,9 @@ def _check_span(span: float, table: RawTable, file: FileMap) -> None:
 def seconds_between(one: datetime.datetime, two: datetime.datetime, path: str) -> float:
     """Return two - one in seconds; stamps with and without a time zone cannot be compared."""
     if (one.tzinfo is None) != (two.tzinfo is None):
-        raise InputError(f"{path}: one clock states its time zone, the other does not; give 'start' or %z.")
+        raise InputError(
+            f"{path}: one clock states its time zone, the other does not; give the other file timezone = 'UTC' (or its own)."
+        )
     return (two - one).total_seconds()
 
 

@@ -10,7 +10,7 @@ from compensation.arrays import Array
 from compensation.constants import NINETY
 from studies.calibration.noise_levels import has_levels
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.verdict import Cause, Interval, share_wrong, same_cause, weigh
+from studies.diagnosis.verdict import Cause, Interval, same_cause, share_wrong, weigh
 from studies.effects import library
 from studies.effects.effect import UNITS
 from studies.inference.background import Background

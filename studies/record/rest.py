@@ -80,7 +80,13 @@ def gather_rest(records: Sequence[Record], outputs: dict[str, float]) -> RestDat
         complete = drop_spikes(np.isfinite(values) & np.isfinite(temperature), values, temperature)
         left_out += int(np.count_nonzero(~complete))
         if np.count_nonzero(complete) < 2:
-            raise InputError(f"{record.path}: no rows with both {output} and {column}; the temperature is missing.")
+            empty = [name for name in (output, column) if np.count_nonzero(np.isfinite(record[name])) < 2]
+            what = (
+                f"{' and '.join(empty)} has no values"
+                if empty
+                else f"{output} and {column} never have a value in one row"
+            )
+            raise InputError(f"{record.path}: {what}; a fit over temperature needs both.")
         time, values, temperature = time[complete], values[complete], temperature[complete]
         if len(time) > MOST_ROWS:
             width = math.ceil((time[-1] - time[0]) / MOST_ROWS * 10) / 10

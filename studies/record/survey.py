@@ -14,7 +14,7 @@ from compensation.errors import CompensationError
 from compensation.lines import Line, find_line
 from compensation.noise import white_rms
 from compensation.samples import is_regular
-from compensation.spikes import find_dropouts, find_spikes, find_step, find_stuck
+from compensation.spikes import NEIGHBOURS, find_dropouts, find_spikes, find_step, find_stuck
 from studies.files.stored import portions
 from studies.progress import told
 from studies.record import COMMANDED, Record
@@ -228,7 +228,10 @@ def _find_settled(record: Record) -> tuple[Soak, ...]:
     column = next((name for name in TEMPERATURES if name in record), None)
     if column is None or not np.isfinite(record[column]).any():
         return ()
-    if "frequency_Hz" in record and np.isfinite(record["frequency_Hz"]).any():
+    both = (
+        np.isfinite(record[column]) & np.isfinite(record["frequency_Hz"]) if "frequency_Hz" in record else np.zeros(1)
+    )
+    if np.count_nonzero(both) >= NEIGHBOURS:
         return tuple(soak for soak in find_soaks([record]) if not soak.extrapolated_K)
     t, T, _ = average_evenly(record["time_s"], record[column])
     least = max(LEAST, 0.02 * (t[-1] - t[0]))
