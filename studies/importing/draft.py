@@ -17,6 +17,7 @@ from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, File
 from studies.importing.meaning import Meaning, find_meanings
 from studies.importing.offset import estimate_offset
 from studies.importing.resampling import ClockedFile
+from studies.importing.sheets import list_sheets
 from studies.importing.timing import TIME_WORDS, find_time
 from studies.schema.keys import spell_value
 from studies.schema.reader import read_keys
@@ -193,6 +194,10 @@ def _describe_notation(path: str, look: Look) -> list[str]:
         ]
         signs = (parting(cell, look.decimal) for row in look.rows[look.data :] for cell in row)
         lines += [f'thousands = "{sign}"' for sign in itertools.islice(filter(None, signs), 1)]
+    elif others := list_sheets(path)[1:]:
+        lines.append(
+            f"# CHECK: this is the first sheet; the others need a [[file]] each, with sheet = one of {', '.join(map(spell_value, others))}"
+        )
     header = 0 if look.header is None else look.header + 1
     end = [f"last_line = {look.last}    # CHECK: below it stands no reading"] if look.last else []
     return [*lines, f"header_line = {header}", f"data_line = {look.data + 1}", *end]
@@ -214,7 +219,14 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
     known = (
         ([], "", "")
         if own is not None
-        else find_time(names, cells, hints, numbers, look.decimal, evenly=period is not None)
+        else find_time(
+            names,
+            {name: [cell for cell in own if cell != name] for name, own in cells.items()},  # the head may come again
+            hints,
+            numbers,
+            look.decimal,
+            evenly=period is not None,
+        )
     )
     time, form, unsure = known
     lines = _describe_notation(path, look)

@@ -1,5 +1,6 @@
 """The entry of one column in a draft of a map: what it means, its unit, and what must be checked."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 
@@ -68,6 +69,7 @@ def draft_unknown(name: str, numbers: Sequence[float]) -> list[str]:
     ]
 
 
+SENTINELS = (999.0, 9999.0, 99999.0)  # sizes of readings that loggers write for none
 _SETTING_WORDS = {
     "clock_Hz": "frequency of the clock that is counted",
     "periods": "number of periods in which it is counted",
@@ -81,10 +83,17 @@ def find_markers(names: Sequence[str], cells: Mapping[str, list[str]], time: Seq
     markers: list[str] = []
     for name in names:
         words = [cell for cell in cells[name] if cell and as_number(cell, decimal) is None]
-        words = [name] * words.count(name) if name in time else words
+        words = [name] * words.count(name) if name in time else [*words, *_sentinels(cells[name], decimal)]
         if 0 < 2 * len(words) < len(cells[name]):
             markers += [word for word in dict.fromkeys(words) if word not in markers]
     return markers[:20]
+
+
+def _sentinels(cells: Sequence[str], decimal: str) -> list[str]:
+    """Return cells such as -999 or 9999 in a column whose other readings do not come near."""
+    numbers = [(cell, abs(number)) for cell in cells if (number := as_number(cell, decimal)) is not None]
+    usual = max((size for _, size in numbers if size not in SENTINELS), default=math.inf)
+    return [cell for cell, size in numbers if size in SENTINELS and size > 2 * usual]
 
 
 def comment_of(text: str) -> str:

@@ -42,11 +42,13 @@ class TextTable(RawTable):
     thousands: str = ""
 
     def joined(self, columns: Sequence[str]) -> "pd.Series[str]":
-        """Return several columns joined by a blank, such as a date and a time of day."""
-        text = self.text(columns[0])
-        for column in columns[1:]:
-            text = text + " " + self.text(column)
-        return text.str.strip()
+        """Return several columns joined by a blank, such as a date and a time of day; nothing where one is marked as missing."""
+        parts = [self.text(column) for column in columns]
+        text = parts[0]
+        for part in parts[1:]:
+            text = text + " " + part
+        marked = np.any([part.isin(self.missing) for part in parts], axis=0)
+        return text.str.strip().mask(marked, "")
 
     def text(self, column: str) -> "pd.Series[str]":
         """Return the cells of one column without the blanks around them."""

@@ -352,8 +352,10 @@ def test_an_excel_workbook(tmp_path):
     for k in range(5):
         book.active.append([START + datetime.timedelta(seconds=2 * k), 293.15 + k, None if k == 2 else 4430.25 + k])
     raw, path = tmp_path / "raw.xlsx", tmp_path / "map.toml"
+    book.create_sheet("afternoon").append([1.0])
     book.save(raw)
     path.write_text(draft_map([str(raw)]).text)
+    assert 'the others need a [[file]] each, with sheet = one of "afternoon"' in path.read_text()
     record = import_records([str(raw)], load_map(path))[""]
     assert record["time_s"].tolist() == [0, 2, 4, 6, 8]
     assert np.allclose(record["housing_temperature_degC"], 20 + np.arange(5.0))
@@ -670,6 +672,15 @@ def test_a_head_that_is_written_again_is_no_reading(tmp_path):
     head, rows = "time [s],temp [°C]", [f"{k},{20 + k / 10}" for k in range(9)]
     raw = table(tmp_path, head, [*rows[:5], head, *rows[5:]])
     assert draft_and_import(raw, tmp_path)["time_s"].tolist() == list(range(9))
+
+
+def test_a_head_written_again_between_stamps_and_a_reading_that_stands_for_none(tmp_path):
+    """With the head among them stamps were taken for seconds, and -999 for a temperature."""
+    head = "Date,Time,Housing Temp (degC)"
+    rows = [f"03/28/2026,12:30:{15 * k:02d} AM,{-999 if k == 2 else 20 + k / 10}" for k in range(4)]
+    record = draft_and_import(table(tmp_path, head, [*rows[:3], head, *rows[3:]]), tmp_path)
+    assert record["time_s"].tolist() == [0, 15, 30, 45]
+    assert np.isnan(record["housing_temperature_degC"]).tolist() == [False, False, True, False]
 
 
 def test_a_column_that_rises_and_has_a_meaning_is_no_clock(tmp_path):

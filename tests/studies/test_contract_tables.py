@@ -34,6 +34,7 @@ BAD = [
     (read_record, b"time_s,bias_deg_per_h\n0,1\n1,1e400\n", ["line 3", "is not a possible reading"]),
     (read_record, b"time_s,frequency_Hz\n0,1,5\n", ["line 2", "3 values", "2 columns"]),
     (read_record, b"time_s,frequency_Hz\n0,4432,07\n", ["decimal commas"]),
+    (read_record, b"time_s,frequency_Hz,inverse_q\n0,1,1\n1,21\n2,1,1,5\n", ["line 3", "2 values", "3 columns"]),
     (read_record, b"time_s,frequency_Hz\n0,1\n0,2\n", ["line 3", "does not increase"]),
     (read_record, b"time_s,frequency_Hz\n,1\n", ["line 2", "time_s is empty"]),
     (read_record, b"time_s,frequency_Hz\n0,1\n# late\n1,2\n", ["line 3", "above the header"]),

@@ -174,6 +174,17 @@ def test_what_is_no_rate_is_not_judged_as_the_bias(folder, capsys, column):
     assert f"--output {column}: the zero-rate output is a column in °/h" in said
 
 
+def test_a_column_without_values_is_none(folder, capsys):
+    """An empty frequency cost every other quantity of its record."""
+    cycle = read_record(folder / "cycle.csv")
+    write_record(cycle.with_columns({"frequency_Hz": np.full(len(cycle), np.nan)}), folder / "empty.csv")
+    status, told, said = judged(capsys, folder, ("empty",))
+    assert status == 0, said
+    named = {one["key"] for one in told["quantities"] if one["value"] is not None}
+    assert "bias_temperature_residual_deg_per_h" in named
+    assert "frequency_temperature_slope_ppm_per_K" not in named
+
+
 def test_a_limit_without_a_record_is_said_and_leaves_the_verdict_open(folder, capsys):
     path = limits(folder, "run_down_time_s = 500\nscale_factor_error_ppm = 100")
     status, found, said = judged(capsys, folder, ("rundown",), "--limits", path)

@@ -163,6 +163,14 @@ def test_contract_bad_input_is_one_sentence(tmp_path, capsys):
     assert main(["show"]) == 2
     write_record(Record({"time_s": np.array([0.0]), "frequency_Hz": np.array([np.nan])}), tmp_path / "short.csv")
     assert main(["show", str(tmp_path / "short.csv"), "--report", str(tmp_path / "page.html")]) == 0
+    apart = np.array([np.nan, 1.0])  # a logger that writes its channels in turn
+    turns = {
+        "time_s": np.arange(80.0),
+        "housing_temperature_degC": 20 + np.tile(apart, 40),
+        "frequency_Hz": 4e3 + np.tile(apart[::-1], 40),
+    }
+    write_record(Record(turns), tmp_path / "turns.csv")
+    assert main(["show", str(tmp_path / "turns.csv")]) == 0
     assert main(["show", str(tmp_path / "none.csv")]) == 2
     assert capsys.readouterr().err.count("Traceback") == 0
 

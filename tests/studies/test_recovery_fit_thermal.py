@@ -89,6 +89,30 @@ def test_a_cubic_law_is_no_heat_path_and_a_law_beyond_it_no_negative_radiation(t
 
 
 @pytest.mark.slow
+def test_rows_far_apart_find_the_lag_of_a_smooth_housing_and_whose_noise_is_left(tmp_path, capsys, ask):
+    """Closed form: a housing with 900 s behind a step, a resonator with 1200 s behind it, rows of 60 s, 3 mK of noise in the thermometer.
+
+    Straight lines between the rows were told as a sensor that is 0.4 s late, and as a slope 3.5 standard deviations off.
+    """
+    t, rng, runs = np.arange(0.0, 10800.0, 60.0), np.random.default_rng(4), []
+    for k, (before, after) in enumerate(((25.0, -15.0), (-15.0, 25.0))):
+        housing = after + (before - after) * np.exp(-t / 900.0)
+        follows = after + (before - after) * (1200.0 * np.exp(-t / 1200.0) - 900.0 * np.exp(-t / 900.0)) / 300.0
+        x = follows - 20.0
+        columns = {"time_s": t, "housing_temperature_degC": housing + 3e-3 * rng.normal(size=t.size)}
+        columns["frequency_Hz"] = 4432.0 * (1 + 8e-5 * x + 5e-8 * x**2) + 2e-5 * rng.normal(size=t.size)
+        runs.append(str(tmp_path / f"run{k}.csv"))
+        write_record(Record(columns), runs[-1])
+    found = ask(["fit", "thermal", *runs, "--confidence", "0.95"])["estimates"]
+    assert not {"delay", "sensor_lag"} & set(found)
+    tau, slope = found["time_constant_1"], found["slope"]
+    assert tau["low"] < 1200.0 < tau["high"]
+    assert slope["low"] < 4432.0 * (8e-5 + 2 * 5e-8 * (5.0 - 20.0)) < slope["high"]
+    assert main(["fit", "thermal", *runs]) == 0
+    assert "noise of the housing's readings alone makes" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("walk", [0.0, 2e-4], ids=["white", "random walk"])
 def test_ninety_percent_intervals_cover_about_nine_in_ten(walk):
     """Of 6 seeds, 3 or fewer hits have a probability of 1.6 % if the coverage is 90 %.
@@ -213,6 +237,10 @@ def test_unusable_records_are_refused(tmp_path, capsys):
         fit_thermal_constants(
             [Record({"time_s": np.arange(9.0), "housing_temperature_degC": np.ones(9)}, path="run.csv")]
         )
+    leaps = one_lag()
+    late = leaps["time_s"] + 1e9 * (np.arange(len(leaps)) >= 100)
+    with pytest.raises(InputError, match=r"leaps by 1.16e\+04 days after 5940 s \(row 100\)"):
+        fit_thermal_constants([leaps.with_columns({"time_s": late})], lags=1)
     with pytest.raises(InputError, match="--lags 9"):
         fit_thermal_constants([one_lag("soak 20 5h")], lags=9)
 
