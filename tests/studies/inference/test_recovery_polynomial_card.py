@@ -8,6 +8,7 @@ import pytest
 
 from compensation.noise import white_rms
 from studies.calibration.calibrate import calibrate
+from studies.calibration.observed import observe
 from studies.cli import main
 from studies.errors import InputError
 from studies.inference.heat_path import with_lags, with_late_sensor
@@ -88,6 +89,18 @@ def test_contract_a_run_beyond_the_records_of_a_polynomial_card_says_so_once(tmp
     assert [str(one.message) for one in heard] == 2 * said
     assert main(["twin", path, "--c", str(tmp_path / "twin")]) == 0
     assert "this twin goes 120 K beyond" in capsys.readouterr().out
+
+
+def test_recovery_of_the_lag_where_one_response_leaks() -> None:
+    """Without a frequency the lag is that of bias and 1/Q together: a leak that doubles 1/Q alone made it 2.5 times as long."""
+    card, runs = build_instrument(TRUE | {"loss": {"inverse_q": 1e-7, "slope_per_K": 4e-3}}), []
+    for k, words in enumerate(("step 20 -10 3h", "step -10 40 3h", "step 40 10 3h")):
+        record = simulate_run(card, load_profile(words), 0.05, k).record
+        leaks = record["inverse_q"] * (1 + 0.4 * (record["time_s"] / 10800 + k))
+        kept = {name: record[name] for name in ("time_s", "housing_temperature_degC", "bias_deg_per_h")}
+        runs += observe([Record(kept | {"inverse_q": leaks})], blocks=120)
+    assert _likeliest_lag(runs, ["inverse_q"], 288.15) > 4000.0
+    assert _likeliest_lag(runs, ["inverse_q", "bias_deg_per_h"], 288.15) == pytest.approx(2000.0, rel=0.3)
 
 
 def test_contract_a_card_says_nothing_of_a_response_that_no_record_had(tmp_path) -> None:
