@@ -6,8 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from compensation.arrays import Array
+from shell.constants import zero_Celsius
 from studies.effects import Coefficient, Effect, Parameter, Span
 from studies.effects.states import States, lag, play
+from studies.record import Record
+from studies.simulation.drive import COLUMN
 
 TEMPERATURE_ORDERS, TIME_ORDERS = 24, 24
 LAGS = tuple(2.0**k for k in range(-4, 4))
@@ -106,6 +109,21 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
         count = 16 if field != "pattern_angle" else 8
         forms.append(_generic(column, drive(field), [1.0] * count, (field,)))
     return forms
+
+
+def beside_chamber(span: Span, records: Sequence[Record]) -> Effect:
+    """Return the form of what the chamber does past the housing (sun, a gradient, the air in the electronics): its lead x of the housing, through lags, times 1 and the temperature."""
+    wide = max(span.temperature_high - span.temperature_low, 1e-9)
+
+    def columns(states: States, shape: Sequence[float], response: str) -> Array:
+        time, air = records[states.run]["time_s"], records[states.run][COLUMN["chamber"]]
+        known = np.isfinite(air)
+        x = (np.interp(states.time + time[0], time[known], air[known]) + zero_Celsius - states.housing) / wide
+        behind = np.stack([x, *(lag(x, states.step, span.tau * part) for part in (0.25, 1.0, 4.0))], axis=1)
+        place = 2.0 * np.clip((states.resonator - span.temperature_low) / wide, 0.0, 1.0) - 1.0
+        return np.concatenate([behind, behind * place[:, None]], axis=1)
+
+    return _generic("the chamber's lead over the housing", columns, [1.0] * 8)
 
 
 def any_lags(span: Span) -> Effect:

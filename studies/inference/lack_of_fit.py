@@ -14,12 +14,13 @@ from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import spell_structure
 from studies.inference.background import Background
-from studies.inference.generic_forms import BUMP, STEP, SWITCH, generic_forms
+from studies.inference.generic_forms import BUMP, STEP, SWITCH, beside_chamber, generic_forms
 from studies.inference.hypothesis import Hypothesis
 from studies.inference.linear import Shapes, Term
 from studies.inference.predicted import Model, Rows
 from studies.inference.search import LESS, SUSPICIOUS, Search
 from studies.inference.sharp import brief_events, fast_line, intermittent, loudness, recurring, switching, tails_of
+from studies.simulation.drive import COLUMN
 
 ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 """Log evidence from which on structure is no chance."""
@@ -67,6 +68,15 @@ def generic_bank(search: Search) -> list[Shapes]:
     """Return the columns of the generic forms."""
     signatures = search.signatures
     forms = [*generic_forms(signatures.span, [path.states for path in signatures.paths]), BUMP, STEP]
+    problem = signatures.problem
+    records, by_housing = (
+        [run.record for run in problem.runs],
+        all(run.inner.boundary == "housing" for run in problem.runs),
+    )
+    if by_housing and all(
+        COLUMN["chamber"] in record and np.isfinite(record[COLUMN["chamber"]]).any() for record in records
+    ):
+        forms.append(beside_chamber(signatures.span, records))
     return search.signatures.shapes_of(signatures.applicable({form.name: form for form in forms}))
 
 

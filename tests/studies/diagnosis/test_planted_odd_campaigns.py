@@ -4,11 +4,21 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from studies.errors import InputError
+from studies.instrument.card import build_instrument
+from studies.record import Record
+from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import diagnose_records
 from tests.studies.diagnosis.bench import BACK, CYCLE, Bench, searched
+from thermal.profile import Profile
 
+LAGGED = {
+    "schema": "hrg.card/1",
+    "name": "one lag",
+    "law": {"f0_Hz": 4432.07, "a1_per_K": 8.1e-5, "a2_per_K2": -7e-8, "lag_s": 2000.0},
+}
 FIRST_DAY = datetime(2026, 3, 1, tzinfo=UTC)
 
 
@@ -45,6 +55,26 @@ def test_a_bias_alone_with_a_term_in_the_rate_finds_its_lag(only):
     (cause,) = verdict.causes
     assert "rate-bias" in cause.names
     assert verdict.responses["bias_deg_per_h"].noise == pytest.approx(0.05, rel=0.05)
+
+
+@pytest.mark.slow
+def test_what_the_chamber_does_past_the_housing_is_structure(only):
+    """Gusts of 2 K and 300 s reach the electronics before the housing: 0.1 °/h for each kelvin of the chamber's lead."""
+    only("rate-bias", "hysteresis", "cross-damping")
+    card, records = build_instrument({**LAGGED, "bias": {"damping_anisotropy": 0.0, "k1_deg_per_h_per_Hz": 0.4}}), []
+    t = np.arange(0.0, 14400.0, 60.0)
+    for number, (before, after) in enumerate(((20.0, -5.0), (-5.0, 35.0), (35.0, 10.0))):
+        rng = np.random.default_rng(number)
+        gusts = lfilter([2.0 * np.sqrt(1.0 - np.exp(-0.4))], [1.0, -np.exp(-0.2)], rng.standard_normal(t.size))
+        air = np.interp(t, [0.0, 3600.0, 7200.0, 14400.0], [before, before, after, after]) + gusts
+        run = simulate_run(card, Profile(t, air + 273.15), 1 / 60, number).record
+        leads = run["chamber_temperature_degC"] - run["housing_temperature_degC"]
+        kept = ("time_s", "chamber_temperature_degC", "housing_temperature_degC", "frequency_Hz")
+        bias = {"bias_deg_per_h": run["bias_deg_per_h"] + 0.1 * leads}
+        records.append(Record({name: run[name] for name in kept} | bias))
+    result = told(records).responses["bias_deg_per_h"]
+    assert result.verdict == "unexplained"
+    assert result.left_over_input == "the chamber's lead over the housing"
 
 
 @pytest.mark.slow
