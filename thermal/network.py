@@ -27,7 +27,12 @@ Capacity = float | Callable[[Any], Any]
 
 def growing(at_20_degC: float, slope: float) -> Capacity:
     """Return a heat capacity that grows by a relative `slope` (1/K)."""
-    return (lambda T: at_20_degC * np.exp(slope * (T - zero_Celsius - 20.0))) if slope else at_20_degC
+
+    def capacity(T: Any) -> Any:
+        with np.errstate(over="ignore"):  # at trial temperatures that no material stands
+            return at_20_degC * np.exp(slope * (T - zero_Celsius - 20.0))
+
+    return capacity if slope else at_20_degC
 
 
 @dataclass(frozen=True)

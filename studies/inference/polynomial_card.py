@@ -163,12 +163,13 @@ def _likeliest_lag(runs: Sequence[ObservedRun], columns: Sequence[str], x0: floa
     longest = max(float(np.ptp(run.inner.time)) for run in runs)
     most = 1e5 if "frequency_Hz" in columns else max(OF_RUN * longest, float(LAGS[1]))
 
-    counts = np.array([sum(len(r.responses[c].value) for r in runs if c in r.responses) for c in columns])
-
     def left(logarithm: float) -> float:
-        unusual = (logarithm - np.log(USUAL_LAG)) / USUAL_SPREAD
+        unusual = float((logarithm - np.log(USUAL_LAG)) / USUAL_SPREAD) ** 2
         rest = [_fit(runs, column, float(np.exp(logarithm)), x0, True)[1] for column in columns]
-        return (rest[0] if len(rest) == 1 else float(counts @ np.log(rest))) + float(unusual) ** 2
+        if len(rest) == 1:
+            return rest[0] + unusual
+        rows = [sum(len(run.responses[one].value) for run in runs if one in run.responses) for one in columns]
+        return float(np.dot(rows, np.log(rest))) + unusual
 
     grid = np.log(LAGS[LAGS <= most])
     seen = np.array([left(one) for one in grid])

@@ -130,16 +130,21 @@ def _impose(instrument: "Instrument", drive: Drive) -> tuple[Profile, Profile]:
     if drive.boundary == "chamber" or read.jumps.size:
         return read, read
     lag = instrument.noise.housing_lag_s * slope_of_reading(read)
-    lines = of_equal_area(read)
-    return Profile(read.time, read.value + lag), drive.kinked(Profile(read.time, lines.value + lag))
+    return Profile(read.time, read.value + lag), drive.kinked(Profile(read.time, of_equal_area(read).value + lag))
 
 
 def of_equal_area(curve: Profile) -> Profile:
-    """Straight lines between the rows of a smooth curve T(t), with the area under it: rows moved by h² T''/12, not beside a gap."""
+    """Straight lines between the rows of a smooth curve T(t), with the area under it: rows moved by h² T''/12, not at a corner nor beside a gap."""
     h = np.diff(curve.time)
     before, after = h[:-1], h[1:]
-    bend = curvature(curve.time, curve.value)[1:-1] * (before**3 + after**3) / (12 * (before + after))
+    bend = _lasting(curvature(curve.time, curve.value))[1:-1] * (before**3 + after**3) / (12 * (before + after))
     return Profile(curve.time, curve.value - np.concatenate([[0.0], bend, [0.0]]))
+
+
+def _lasting(bend: Array) -> Array:
+    """Return of T'' at each row what a neighbour has as well, of the two the larger: of a lone corner, or of noise, nothing (minmod)."""
+    small = np.where(bend[1:] * bend[:-1] > 0.0, np.minimum(np.abs(bend[1:]), np.abs(bend[:-1])), 0.0)
+    return np.asarray(np.sign(bend) * np.maximum(np.append(0.0, small), np.append(small, 0.0)))
 
 
 def _slope_of_timing(

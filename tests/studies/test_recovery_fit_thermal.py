@@ -22,16 +22,20 @@ from thermal.radiative import integrate
 
 ROOM = 293.15
 SLOPE, CURVATURE = 0.3716, -9.7e-4
+FINER = 4
 STEPS = "step 20 -10 4h then step -10 40 4h"
 
 
-def housing(words, step=60.0):
+def housing(words, row=60.0):
+    """Times and temperatures four times as fine as the rows of a record: a curve, and no lines between these."""
+    step = row / FINER
     profile = parse_profile(words)
     t = np.arange(0.0, profile.end, step)
     return t, lag(np.concatenate([[-step], t]), np.concatenate([profile.value[:1], profile.at(t)]), 600.0)[1:]
 
 
 def record(t, T_h, T_r, seed=1, white=3e-3, walk=0.0, sensor=0.01, higher=(0.0, 0.0)):
+    t, T_h, T_r = t[::FINER], T_h[::FINER], T_r[::FINER]
     rng, x = np.random.default_rng(seed), T_r - ROOM
     f = 4432.07 + SLOPE * x + CURVATURE * x**2 + higher[0] * x**3 + higher[1] * x**4 + white * rng.normal(size=t.size)
     f += walk * np.cumsum(rng.normal(size=t.size))
@@ -43,8 +47,8 @@ def record(t, T_h, T_r, seed=1, white=3e-3, walk=0.0, sensor=0.01, higher=(0.0, 
     return Record(columns, path="run.csv")
 
 
-def one_lag(words=STEPS, tau=1800.0, departure=1.5, **noise):
-    t, T_h = housing(words)
+def one_lag(words=STEPS, tau=1800.0, departure=1.5, row=60.0, **noise):
+    t, T_h = housing(words, row)
     return record(t, T_h, lag(t, T_h, tau) + departure * np.exp(-t / tau), **noise)
 
 
@@ -52,7 +56,7 @@ def one_lag(words=STEPS, tau=1800.0, departure=1.5, **noise):
 @pytest.mark.parametrize("late", [5.0, 10.0])
 def test_a_sensor_that_leads_by_seconds_is_no_radiation(late):
     """A second lag of seconds was told as a radiated share of 0.04 to 0.10, 4 to 6 of its errors from none."""
-    t, T_h = housing("ramp -20 25 0.75 then soak 25 4h", step=10.0)
+    t, T_h = housing("ramp -20 25 0.75 then soak 25 4h", row=10.0)
     found = fit_thermal_constants([record(t, T_h, lag(t, lag(t, T_h, late), 1200.0), white=1e-3)]).estimates
     tau, share, delay = found["time_constant_1"], found["radiated_share"], found["delay"]
     assert tau.low < 1200.0 < tau.high
@@ -159,7 +163,7 @@ def test_the_radiated_share_of_lumps_is_found(taus, past, late):
 
     Or the last alone radiates, to the housing: a shell that does not see its base; the housing may be read by a sensor of 60 s.
     """
-    t, T_h = housing("step 20 -40 3h then step -40 60 3h")
+    t, T_h = housing("step 20 -40 3h then step -40 60 3h", row=30.0)
     parts, before = [Boundary("housing")], "housing"
     for k, tau in enumerate(taus):  # each too small to load the one before
         g, name = 1e-6**k / tau, f"lump {k}"
@@ -171,12 +175,14 @@ def test_the_radiated_share_of_lumps_is_found(taus, past, late):
         before = name
     T_r = integrate(assemble(parts), {"housing": Profile(t, T_h)}, relative_tolerance=1e-9).node(before, t)
     read = lag(t, T_h, late) if late else T_h
-    found = fit_thermal_constants([record(t, read, T_r, sensor=0.0)], lags=2 if past else None).estimates
+    found = fit_thermal_constants(
+        [record(t, read, T_r, sensor=0.0)], lags=2 if past else None, confidence=0.95
+    ).estimates
     assert f"time_constant_{len(taus) + 1}" not in found  # where the number is sought: of one lump
     assert not late or found["sensor_time_constant"].value == pytest.approx(late, abs=1.0)
     named = sorted((found[f"time_constant_{k}"] for k in range(1, len(taus) + 1)), key=lambda one: -one.value)
     # beside capacities that may go with temperature less is known, and the intervals say so
-    assert [one.value for one in named] == pytest.approx(taus, rel=0.04 if past else 0.02)
+    assert [one.value for one in named] == pytest.approx(taus, rel=0.05 if past else 0.02)
     assert all(one.low < tau < one.high for one, tau in zip(named, taus, strict=True))
     if past:  # beside a load and a capacity that may go with temperature less is known
         for name, truth in (("radiated_share", 0.4), ("direct_share", 1.0), ("base_radiated_share", 0.0)):
@@ -247,7 +253,7 @@ def test_unusable_records_are_refused(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_a_chamber_stands_for_the_housing_that_nobody_measured():
-    run = one_lag()
+    run = one_lag(row=15.0)  # what commands a chamber goes straight from row to row
     columns = {name.replace("housing", "chamber"): own for name, own in run.columns.items()}
     found = fit_thermal_constants([Record(columns, path="run.csv")], lags=1).estimates
     assert found["time_constant_1"].value == pytest.approx(1800.0, rel=2e-3)

@@ -15,9 +15,13 @@ def test_the_band_is_wilsons():
 
 
 def test_a_further_name_has_a_doubt_of_its_own_and_a_value_that_of_the_first():
-    causes = [Cause(name, "frequency_Hz", 1.0, (), {}, 10.0, kind) for name, kind in (("E", "value"), ("jump", "physics"), ("leak", "physics"))]  # fmt: skip
-    left = [1.0 - cause.probability for cause in doubted(causes)]
-    assert left == pytest.approx([CONSTANTS[name] for name in ("doubt", "doubt", "doubt_further")])
+    """At evidence 100 the share that is stated, its odds times a factor for further names; a power of the evidence less beyond."""
+    causes = [Cause(name, "frequency_Hz", 1.0, (), {}, evidence, kind) for name, evidence, kind in (
+        ("E", 100.0, "value"), ("jump", 100.0, "physics"), ("leak", 100.0, "physics"), ("ageing", 1e4, "physics"))]  # fmt: skip
+    odds = [(1.0 - cause.probability) / cause.probability for cause in doubted(causes)]
+    usual = CONSTANTS["doubt"] / (1.0 - CONSTANTS["doubt"])
+    further = usual * CONSTANTS["doubt_further"]
+    assert odds == pytest.approx([usual, usual, further, further / 100.0 ** CONSTANTS["doubt_falls"]])
 
 
 def line(key, kind, hidden, verdict, *names):

@@ -37,7 +37,7 @@ def a_day_in_the_chamber():
     housing = np.full(time.size, 20.0)
     for k, (first, second) in enumerate(LEVELS):
         own = time // (RUN + PAUSE) == k
-        corners = [0.0, 600.0, 2400.0, 4000.0, 6000.0, 8200.0, RUN]
+        corners = [0.0, 600.0, 2400.0, 4020.0, 6000.0, 8220.0, RUN]  # on rows
         housing[own] = np.interp(place[own], corners, [20.0, 20.0, first, first, second, second, 20.0])
     resonator = (1.0 - SHARE) * lag(time, housing, 500.0) + SHARE * lag(time, housing, SLOW)
     x = resonator - 20.0

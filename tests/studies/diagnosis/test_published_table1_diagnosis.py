@@ -58,7 +58,7 @@ def test_table1_beside_the_papers_card_says_what_an_engineer_asks_first():
     )  # the same data
     assert "less than the 8 that proves a cause" in text
     assert headline(found.verdict).endswith(
-        "One of curvature, activity-dip, mounting-stress, radiation or thermometer-scale in the frequency (probability 0.58)."
+        "One of curvature, activity-dip, mounting-stress, radiation or thermometer-scale in the frequency (probability 0.36)."
     )
     assert "approached from one side" not in text  # the file does not say so
     assert found.verdict.verdict == "not-identifiable"
