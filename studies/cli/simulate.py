@@ -24,7 +24,7 @@ DRIVES = (
 UNCERTAINTY = "Uncertainty of the prediction (standard deviation, rms over the run)"
 SPREAD = "0: column | 1: in all .3 | 2: by its start .3"
 BEGUN = "How the run began: departures from having settled"
-DEPARTURES = "0: part | 1: departure K .3 | 2: standard deviation K .3"
+DEPARTURES = "0: part | 1: departure (K) .3 | 2: standard deviation (K) .3"
 
 
 @answers("hrg.simulate/1")
