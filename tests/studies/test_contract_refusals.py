@@ -61,7 +61,6 @@ REFUSED = {
     "fit frequency HRG --order 7": "order",
     "fit frequency none.csv": "no such file",
     "fit frequency ROW": "'time' has 1 row;",
-    "show ROW": "'time' has 1 row;",
     "diagnose ROW": "is needed, with two values or more",
     "diagnose RUN --plan 'soak 20 1h'": "run.csv: this is a record of a run; --plan takes profiles",
     "diagnose --plan RUN": "run.csv: this is a record of a run; --plan takes profiles",

@@ -151,7 +151,7 @@ def test_paper_twin():
         (lambda text: text.replace("bias_deg_per_h", "quadrature_V"), "bias_deg_per_h"),
         (lambda text: text.splitlines()[0] + "\n0,20,1\n1,20,1\n2,20,1\n3,20,2\n4,20,1\n5,20,1\n6,20,1", "constant"),
         (lambda text: text.splitlines()[0] + "".join(f"\n{i},{20 + i},{i % 3}" for i in range(20)), "too few"),
-        (lambda text: text.splitlines()[0] + "\n0,,1\n1,,1\n", "temperature is missing"),
+        (lambda text: text.splitlines()[0] + "\n0,,1\n1,,1\n", "temperature_degC has no values"),
         (lambda text: text.splitlines()[0] + "\n0,20,1\n1,21,1\n2,22,1\n", "rows"),
     ],
 )
