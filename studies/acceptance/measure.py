@@ -112,7 +112,7 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
     Where the frequency is measured, the temperature is that of the resonator, which lags as the frequency shows.
     """
     whole = sum(float(np.ptp(record["time_s"])) for record in records)
-    followed = [_follow(record, whole / MOST) for record in records if _has(record, "frequency_Hz")]
+    followed = [_follow(record, whole / MOST) for record in records if record.has_values("frequency_Hz")]
     paths = [record.path for record in records]
     found: Found = {}
     lags, without = (0.0, 0.0), list[tuple[float, float]]()
@@ -120,7 +120,7 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
         lags, without, value, sd = slope_behind(followed)
         scale = 1e6 / float(np.mean(np.concatenate([run.output for run in followed])))
         found["frequency_temperature_slope_ppm_per_K"] = within(value, sd, paths, PARTS - 1, scale=scale)
-    courses = [_course(record, output, BLOCK) for record in records if _has(record, output)]
+    courses = [_course(record, output, BLOCK) for record in records if record.has_values(output)]
     if courses:
         y = np.concatenate([run.output for run in courses])
         ends = np.cumsum([0, *(len(run.time) for run in courses)])
@@ -163,10 +163,6 @@ def _check_length(record: Record, blocks: Array) -> None:
 def _follow(record: Record, width: float) -> Course:
     """Return the averages of a record's frequency and temperature, over `width` (s) where that is more than usual and leaves enough."""
     return _course(record, "frequency_Hz", max(BLOCK, min(width, float(np.ptp(record["time_s"])) / FEWEST)))
-
-
-def _has(record: Record, column: str) -> bool:
-    return column in record and bool(np.isfinite(record[column]).any())
 
 
 def _course(record: Record, output: str, width: float) -> Course:

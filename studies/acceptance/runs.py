@@ -46,7 +46,7 @@ def length_of(record: Record) -> float:
 
 def temperature_column(record: Record) -> str | None:
     """Return the temperature that a record is judged by: the housing's, the resonator's or the chamber's."""
-    return next((name for name in TEMPERATURES if name in record and np.isfinite(record[name]).any()), None)
+    return next((name for name in TEMPERATURES if record.has_values(name)), None)
 
 
 def sort_records(records: Sequence[Record], output: str) -> tuple[dict[Test, list[Record]], list[Record]]:

@@ -83,12 +83,10 @@ class CardProblem:
     def starts(self) -> tuple[tuple[int, str, float], ...]:
         """What is free of each run, with its prior sd: departures (K), the chamber's clock and its jumps (s), kinks of the housing there."""
         away = [start_spread(run, self.instrument, self.law) for run in self.runs]
-        absent = () if self.instrument.polynomial is None else self.instrument.polynomial.absent
         found = [
             (k, f"initial.{lump}", away[part.run])
             for k, part in enumerate(self.parts)
-            for lump in part.drive.departing
-            if lump not in absent
+            for lump in departing(self.instrument, part.drive)
         ]
         for k, part in enumerate(self.parts):
             if part.drive.boundary == "housing":
@@ -253,6 +251,12 @@ class CardProblem:
         J = np.zeros((len(table.frequency), self.count))
         J[:, : len(scale)] = columns @ scale
         return J
+
+
+def departing(instrument: "Instrument", drive: Drive) -> list[str]:
+    """Return the parts of an instrument whose temperature at the start of a run may depart from the settled one."""
+    absent = () if instrument.polynomial is None else instrument.polynomial.absent
+    return [lump for lump in drive.departing if lump not in absent]
 
 
 def wide_law(

@@ -15,7 +15,7 @@ from studies.calibration.ahead import spread_of_prediction
 from studies.calibration.fit import covariance_at, descend, fit
 from studies.calibration.observed import MOST_BLOCKS, RESPONSES, observe
 from studies.calibration.priors import Priors
-from studies.calibration.problem import MOST_SPREAD, CardProblem, wide_law
+from studies.calibration.problem import MOST_SPREAD, CardProblem, departing, wide_law
 from studies.errors import InputError
 from studies.record import Record, read_record
 from studies.simulation.chamber import is_record
@@ -63,13 +63,12 @@ def begin(
 
 def find_start(instrument: "Instrument", record: "Record", drive: "Drive", readings: float = 0.0) -> Start:
     """Find how the gyro of a record, which drives a run, began: by its first `readings` (s) and the values of the card, else by its prior."""
-    if not any(name in record and np.isfinite(record[name]).any() for name in RESPONSES):
+    if not any(record.has_values(name) for name in RESPONSES):
         if readings:
             raise InputError(
                 f"{record.path}: no reading of {', '.join(RESPONSES)} tells how the run began; leave out --start."
             )
-        absent = () if instrument.polynomial is None else instrument.polynomial.absent
-        parts = [part for part in drive.departing if part not in absent]
+        parts = departing(instrument, drive)
         return Start(dict.fromkeys(parts, 0.0), MOST_SPREAD * np.eye(len(parts)))
     (run,) = observe([record])
     imposed = run.outer if drive.boundary == "chamber" and run.outer is not None else run.inner

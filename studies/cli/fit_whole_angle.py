@@ -193,7 +193,7 @@ def _fit_record(
     record: Record, bryan_factor: float, volts_per_hertz: float | None, card: Instrument | None, confidence: float, late: float,
 ) -> WaveFit:  # fmt: skip
     for name in ("pattern_angle_deg", RATE, "bias_deg_per_h", "frequency_Hz", "inverse_q", "quadrature_V"):
-        if name in record and not np.isfinite(record[name]).any():
+        if name in record and not record.has_values(name):
             raise InputError(
                 f"{record.path}: {name} has no values; leave the column out, or give a record that has them."
             )

@@ -11,6 +11,7 @@ from studies.calibration.start import begin
 from studies.cli.arguments import POSITIVE, PROFILE, Card, Out, Seed, Theory
 from studies.cli.output import answers, keep_record, say
 from studies.instrument.card import load_card
+from studies.record import Record, read_record
 from studies.results import Figure, Result, Sentence, Table, row_of
 from studies.simulation.chamber import is_record, load_drive
 from studies.simulation.virtual_gyro import simulate_run
@@ -58,9 +59,10 @@ def simulate(
         start: Time of a record (30min, 2h) whose readings tell how its gyro began; else it begins settled at the first temperature.
     """
     instrument = load_card(card)
-    drive, begun = load_drive(profile, boundary, 1 / row), None
-    if start or (spread and is_record(profile)):
-        drive, begun = begin(instrument, profile, drive, parse_duration(start) if start else 0.0)
+    given = read_record(profile) if is_record(profile) else profile
+    drive, begun = load_drive(given, boundary, 1 / row), None
+    if start or (spread and isinstance(given, Record)):
+        drive, begun = begin(instrument, given, drive, parse_duration(start) if start else 0.0)
     run = simulate_run(instrument, drive, 1 / row, seed, not noiseless, theory)
     for warning in run.warnings:
         say(f"warning: {warning}")

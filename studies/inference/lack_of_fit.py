@@ -68,15 +68,9 @@ def generic_bank(search: Search) -> list[Shapes]:
     """Return the columns of the generic forms."""
     signatures = search.signatures
     forms = [*generic_forms(signatures.span, [path.states for path in signatures.paths]), BUMP, STEP]
-    problem = signatures.problem
-    records, by_housing = (
-        [run.record for run in problem.runs],
-        all(run.inner.boundary == "housing" for run in problem.runs),
-    )
-    if by_housing and all(
-        COLUMN["chamber"] in record and np.isfinite(record[COLUMN["chamber"]]).any() for record in records
-    ):
-        forms.append(beside_chamber(signatures.span, records))
+    runs = signatures.problem.runs
+    if all(run.inner.boundary == "housing" and run.record.has_values(COLUMN["chamber"]) for run in runs):
+        forms.append(beside_chamber(signatures.span, [run.record for run in runs]))
     return search.signatures.shapes_of(signatures.applicable({form.name: form for form in forms}))
 
 

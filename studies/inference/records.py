@@ -61,7 +61,7 @@ def make_ready(given: Sequence[Record]) -> Campaign:
     if not timed and len(kept) > 1:
         notes.append("The records have no distinct start times (# start: …); they are treated as consecutive.")
     for name in COMMAND_COLUMNS:
-        there = [name in record and np.isfinite(record[name]).any() for record in kept]
+        there = [record.has_values(name) for record in kept]
         if any(there) and not all(there) and name != RATE:
             notes.append(f"{name} is not in every record and was left out.")
             tables = [{key: own for key, own in table.items() if key != name} for table in tables]

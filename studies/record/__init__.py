@@ -89,6 +89,10 @@ class Record:
     def __len__(self) -> int:
         return len(self.columns["time_s"])
 
+    def has_values(self, name: str) -> bool:
+        """Whether it has a column with a value in it."""
+        return name in self.columns and bool(np.isfinite(self.columns[name]).any())
+
     def __repr__(self) -> str:
         time = self.columns.get("time_s")
         span = f" over {(time[-1] - time[0]) / 3600:.3g} h" if time is not None and len(time) > 1 else ""

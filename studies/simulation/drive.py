@@ -182,12 +182,12 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     commands = {
         name: (_held(rows, record[column]) * factor) ** power
         for name, (column, factor, power) in COMMANDS.items()
-        if column in record and np.isfinite(record[column]).any()
+        if record.has_values(column)
     }
     if time is not None:
         commands = {name: np.interp(time, rows, values) for name, values in commands.items()}
     turned = None
-    if RATE in record and np.isfinite(record[RATE]).any():
+    if record.has_values(RATE):
         applied = _held(rows, record[RATE])
         turned = np.radians(applied if time is None else np.interp(time, rows, applied))
     return Drive(

@@ -52,7 +52,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     moves the resonator lags, and the difference stays in the result.
     """
     model.check_output(("frequency_Hz",))
-    column = next((name for name in TEMPERATURES if name in record and np.isfinite(record[name]).any()), None)
+    column = next((name for name in TEMPERATURES if record.has_values(name)), None)
     if column is None:
         return {RESONATOR: find_temperature(model, record["frequency_Hz"], record.path or "record", spare=extrapolate)}
     if "frequency_Hz" in record and not extrapolate:
