@@ -154,7 +154,7 @@ def lowest_pairs(factor: Factor, mass: Mass, count: int, accuracy: float) -> tup
         block, link = _orthonormal(mass, rest)
         is_last = not block[0].shape[1] or used + block[0].shape[1] > most
         if used >= max(count, 2 * wide) or (is_last and used >= count):
-            theta, turn = _eigenpairs((T[:used, :used] + T[:used, :used].T) / 2)
+            theta, turn = np.linalg.eigh((T[:used, :used] + T[:used, :used].T) / 2)
             theta, turn = theta[::-1], turn[:, ::-1]
             undone = _undone(theta, np.linalg.norm(link @ turn[first:used, :count], axis=0), count)
             if is_last or np.max(undone) < accuracy:
@@ -170,11 +170,9 @@ def lowest_pairs(factor: Factor, mass: Mass, count: int, accuracy: float) -> tup
 def _orthonormal(mass: Mass, x: Array) -> tuple[tuple[Array, Array], Array]:
     """An M-orthonormal basis of the columns, and M times it; and the factors, x = basis @ factors."""
     # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
-    reflectors, tau, _, _ = scipy.linalg.lapack.dgeqrf(x)
-    right = np.triu(reflectors[: x.shape[1]])
-    columns = np.asarray(scipy.linalg.lapack.dorgqr(reflectors, tau)[0])
+    columns, right = np.linalg.qr(x)
     loaded = mass @ columns
-    squares, axes = _eigenpairs(columns.T @ loaded)
+    squares, axes = np.linalg.eigh(columns.T @ loaded)
     kept = squares > 1e-14 * squares[-1]
     scale = np.sqrt(squares[kept])
     axes = axes[:, kept]
@@ -190,14 +188,6 @@ def _undone(theta: Array, residual: Array, count: int) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         by_angle = np.where(apart > 0, (residual / apart) ** 2, np.inf)
     return np.asarray(np.minimum(by_angle, residual / theta[:count]))
-
-
-def _eigenpairs(matrix: Array) -> tuple[Array, Array]:
-    """Eigenvalues, rising, and eigenvectors of a small symmetric matrix."""
-    values, vectors, fault = scipy.linalg.lapack.dsyevd(matrix)
-    if fault:
-        raise ShellError("the eigenvalues of the subspace did not converge.")
-    return np.asarray(values), np.asarray(vectors)
 
 
 def _definite(factor: Array, fault: int) -> Array:

@@ -1,9 +1,8 @@
 """Elements and their matrices: groups of one kind, and the system of all of them on the free unknowns."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -163,36 +162,33 @@ class System:
     @cached_property
     def pattern(self) -> Pattern:
         """The elements' free unknowns."""
-        return find_pattern([at.free for at in self.to_free], self.constraint.shape[1])
+        columns = (columns for _, columns, _ in self._terms())
+        free = [np.fromiter(dict.fromkeys(own.tolist()), dtype=np.intp) for own in columns]
+        return find_pattern(free, self.constraint.shape[1])
 
     @cached_property
-    def maps(self) -> list[list["ToFree"]]:
-        """From the unknowns of every element of every group to its free ones, in the order of `pattern`."""
-        found = (at.reordered(order) for at, order in zip(self.to_free, self.pattern.order, strict=True))
-        return [list(islice(found, len(group.unknowns))) for group in self.groups]
+    def maps(self) -> list[NDArray[Any]]:
+        """See `restrict`: from the free unknowns of every element, in the order of `pattern`, to its own."""
+        found: list[NDArray[Any]] = []
+        sizes = np.repeat([g.unknowns.shape[1] for g in self.groups], [len(g.unknowns) for g in self.groups])
+        for free, size, (rows, columns, factors) in zip(self.pattern.unknowns, sizes, self._terms(), strict=True):
+            rank = np.argsort(free)
+            place = rank[np.searchsorted(free, columns, sorter=rank)]
+            if len(columns) == len(free) and np.all(factors == 1):
+                found.append(rows[np.argsort(place)])
+            else:
+                found.append(np.zeros((size, len(free))))
+                found[-1][rows, place] = factors
+        return found
 
-    @cached_property
-    def to_free(self) -> list["ToFree"]:
-        """From the unknowns of every element to its free ones, in their own order."""
-        P = self._choice[0]
-        uses = np.diff(P.indptr)
-        maps: list[ToFree] = []
-        first = 0
+    def _terms(self) -> Iterator[tuple[Index, Index, Array]]:
+        """Of every element: its unknowns, the free ones that they follow, by what factors."""
+        P, first = self._choice[0], 0
         for group in self.groups:
-            size = group.unknowns.shape[1]
             for _ in group.unknowns:
-                terms, start, stop = uses[first : first + size], P.indptr[first], P.indptr[first + size]
-                columns, factors = P.indices[start:stop], P.data[start:stop]
-                kept = np.flatnonzero(terms)
-                if len(set(columns.tolist())) == len(kept) == len(columns) and np.all(factors == 1):
-                    maps.append(ToFree(columns.astype(np.intp), kept))
-                else:
-                    free, place = np.unique(columns, return_inverse=True)
-                    matrix = np.zeros((size, len(free)))
-                    matrix[np.repeat(np.arange(size), terms), place] = factors
-                    maps.append(ToFree(free.astype(np.intp), kept, matrix))
-                first += size
-        return maps
+                at = P.indptr[first : (first := first + group.unknowns.shape[1]) + 1]
+                here = slice(at[0], at[-1])
+                yield np.repeat(np.arange(len(at) - 1), np.diff(at)), P.indices[here], P.data[here]
 
     @property
     def memory(self) -> float:
@@ -205,9 +201,10 @@ class System:
         """Stiffness, plus `shift` (1/s²) times mass, of every element, and the mass, `over` a divisor."""
         K: list[Array] = []
         M: list[Array] = []
-        for group, maps, c in zip(self.groups, self.maps, constants, strict=True):
+        maps = iter(self.maps)
+        for group, c in zip(self.groups, constants, strict=True):
             stiffness, mass = group.integrals(c.lame[0] / over, c.lame[1] / over, c.rho / over, shift)
-            K += [at.restrict(one) for at, one in zip(maps, stiffness, strict=True)]
+            K += [restrict(one, to) for one, to in zip(stiffness, maps, strict=False)]
             M.append(mass)
         return K, self.sum(M)
 
@@ -235,27 +232,13 @@ class System:
         return np.asarray(self.constraint.T @ raw)
 
 
-@dataclass(frozen=True, eq=False)
-class ToFree:
-    """From an element's unknowns to free ones: a choice of those that are kept, or a full matrix of factors."""
-
-    free: Index
-    kept: Index
-    factors: Array | None = None
-
-    def reordered(self, order: Index) -> "ToFree":
-        """The same with the free unknowns in another order."""
-        if self.factors is not None:
-            return ToFree(self.free[order], self.kept, self.factors[:, order])
-        return ToFree(self.free[order], self.kept[order])
-
-    def restrict(self, matrix: Array) -> Array:
-        """The element's matrix on the free unknowns."""
-        if self.factors is not None:
-            return np.asarray(self.factors.T @ matrix @ self.factors)
-        if len(self.kept) == len(matrix) and np.all(self.kept[1:] > self.kept[:-1]):
-            return matrix
-        return np.asarray(matrix.ravel().take(self.kept[:, None] * len(matrix) + self.kept, mode="clip"))
+def restrict(matrix: NDArray[Any], to: NDArray[Any]) -> NDArray[Any]:
+    """An element's matrix on its free unknowns: `to` is a choice of its own, or the matrix from the free ones to them."""
+    if to.ndim == 2:
+        return np.asarray(to.T @ matrix @ to)
+    if len(to) == len(matrix) and np.all(to[1:] > to[:-1]):
+        return matrix
+    return np.asarray(matrix.ravel().take(to[:, None] * len(matrix) + to, mode="clip"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,13 +257,3 @@ class ElementSum:
         for block, rows in zip(self.blocks, np.split(local, self.starts), strict=True):
             rows[:] = (block @ rows.reshape(*block.shape[:2], -1)).reshape(rows.shape)
         return np.asarray(self.back @ local)
-
-    @property
-    def real(self) -> "ElementSum":
-        """Its real part."""
-        return replace(self, blocks=tuple(block.real for block in self.blocks))
-
-    @property
-    def imag(self) -> "ElementSum":
-        """Its imaginary part."""
-        return replace(self, blocks=tuple(block.imag for block in self.blocks))

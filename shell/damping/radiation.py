@@ -22,7 +22,7 @@ from shell.errors import ShellError
 from shell.kernel import lame
 from shell.quadrature import Array
 from shell.sparse import Index, assemble_elements, factor_symmetric
-from shell.system import ElementSum, ShellGroup, SolidGroup, System
+from shell.system import ElementSum, ShellGroup, SolidGroup, System, restrict
 
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
@@ -70,15 +70,16 @@ class RadiatingBody:
     def factor(self, shift: complex) -> Callable[[Complex], Complex]:
         """The solution of (K - shift M) x = b as a function of b."""
         parts = zip(self.stiffness.blocks, self.mass.blocks, strict=True)
-        maps, elements = self.system.to_free, [one for K, M in parts for one in K - shift * M]
-        free = [at.restrict(one) for at, one in zip(maps, elements, strict=True)]
-        size = self.system.constraint.shape[1]
-        return factor_symmetric(assemble_elements([at.free for at in maps], free, size), 1e-3)
+        elements = (one for K, M in parts for one in K - shift * M)
+        free = [restrict(one, to) for one, to in zip(elements, self.system.maps, strict=True)]
+        pattern = self.system.pattern
+        return factor_symmetric(assemble_elements(pattern.unknowns, free, pattern.size), 1e-3)
 
     def judge(self, v: Complex, eigenvalue: complex) -> Radiating:
         """Frequency and loss of an eigenvector."""
-        K, M = self.stiffness, self.mass
-        k_r, k_i, m_r, m_i, body = (float(np.vdot(v, A @ v).real) for A in (K.real, K.imag, M.real, M.imag, self.body))
+        both = [(A, part) for A in (self.stiffness, self.mass) for part in (np.real, np.imag)]
+        sums = [replace(A, blocks=tuple(part(block) for block in A.blocks)) for A, part in both]
+        k_r, k_i, m_r, m_i, body = (float(np.vdot(v, A @ v).real) for A in (*sums, self.body))
         inverse_q = (k_i * m_r - k_r * m_i) / (k_r * m_r + k_i * m_i)
         return Radiating(float(np.sqrt(eigenvalue.real) / (2 * np.pi)), inverse_q, body / m_r)
 
