@@ -33,11 +33,10 @@ def build_system(resonator: Resonator, n: int, level: Level, alongside: tuple[in
 
     It is kept for the next material or temperature, since only the material changes with them.
     """
-    rigid = 0 if resonator.support != "free" or n > 1 else 2
-    return assemble(resonator, lay_resonator(resonator, n, level, alongside), n, level, rigid)
+    return assemble(resonator, lay_resonator(resonator, n, level, alongside), n, level)
 
 
-def assemble(resonator: Resonator, layout: Layout, n: int, level: Level, rigid_motions: int = 0) -> System:
+def assemble(resonator: Resonator, layout: Layout, n: int, level: Level) -> System:
     """Number and tabulate the elements of a layout, its own or one that was extended."""
     groups: list[Group] = []
     rows = Rows()
@@ -58,6 +57,7 @@ def assemble(resonator: Resonator, layout: Layout, n: int, level: Level, rigid_m
         cells, inner_rows, size = solid_group(mesh, solid, ties, n, level.block, size)
         groups.append(cells)
         rows.extend(inner_rows)
+    rigid_motions = 2 if resonator.support == "free" and n < 2 else 0
     return System(tuple(groups), rows.matrix(size), rigid_motions, n, level)
 
 

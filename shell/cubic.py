@@ -26,7 +26,6 @@ from shell.errors import ShellError
 from shell.modes import solve_modes
 from shell.quadrature import Array
 from shell.resonator import Resonator
-from shell.sparse import assemble_elements
 from shell.system import System
 
 REACH = 8  # harmonics above n that take part
@@ -114,7 +113,7 @@ def _lowest(systems: list[System], harmonics: list[int], crystal: Cubic, n: int,
     for system, k, a, b in zip(systems, harmonics, ends, ends[1:], strict=False):
         # K with λ = C₁₂ and G = C₄₄, and M, of the free unknowns of one harmonic
         elements, mass = system.operators([find_constants(one.table.position, part, False) for one in system.groups])
-        elastic = assemble_elements(system.pattern.unknowns, elements, b - a).toarray()
+        elastic = system.pattern.assemble(elements).toarray()
         axial, around, across, shear = _strains(system)
         K[a:b, a:b] = elastic + crystal.excess * (axial.T @ axial + around.T @ around / 2)
         M[a:b, a:b] = mass @ np.eye(b - a)

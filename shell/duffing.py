@@ -24,7 +24,7 @@ from shell.modes import Mode, TheoryRangeWarning
 from shell.prestress import neighbour, settle
 from shell.quadrature import Array
 from shell.solution import Solution, total
-from shell.sparse import assemble_elements, factor_symmetric
+from shell.sparse import PIVOTING, factor_symmetric
 
 NEAR = 0.01  # of twice the frequency, by which it is moved to see whether another mode lies near
 SETTLED = 0.1  # share of the coefficient that this may change
@@ -74,9 +74,8 @@ def amplitude_shift(mode: Mode) -> AmplitudeShift:
 
 def _inertia(z: Solution, force: Array, driven: float) -> tuple[float, float]:
     """Return zᵀ M z_d with (K - Λ M) z_d = f at Λ = `driven`, and its derivative by Λ."""
-    system = z.system
-    elements, M = system.operators(z.constants, -driven)
-    solve = factor_symmetric(assemble_elements(system.pattern.unknowns, elements, system.pattern.size), 0.01)
-    (heavy,) = (M @ z.vector[:, None]).T
+    elements, M = z.system.operators(z.constants, -driven)
+    solve = factor_symmetric(z.system.pattern.assemble(elements), PIVOTING)
+    heavy = M @ z.vector
     z_d, other = solve(force), solve(heavy)
-    return float(heavy @ z_d), float(other @ (M @ z_d[:, None])[:, 0])
+    return float(heavy @ z_d), float(other @ (M @ z_d))

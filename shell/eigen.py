@@ -3,16 +3,18 @@
 λ_min/λ_max of a thin shell is about (h/R)², so dense eigensolvers lose the digits that matter; here K is only inverted.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from shell.errors import ShellError
 from shell.quadrature import Array
-from shell.sparse import Index
+from shell.sparse import Index, assemble_elements
 
 TOO_THIN = "double precision cannot resolve the stiffness: the shell is too thin (h/R far below 1e-6)."
 BLOCK = 3  # vectors a step; modes that coincide (torsion and axial, mirror images) need two
@@ -32,6 +34,10 @@ class Pattern:
     shared: Index  # global numbers of the shared unknowns, in that order
     size: int
     band: int
+
+    def assemble(self, elements: Sequence[NDArray[Any]]) -> "scipy.sparse.csc_matrix":
+        """The sum of the elements' matrices, (size, size)."""
+        return assemble_elements(self.unknowns, elements, self.size)
 
 
 def find_pattern(unknowns: list[Index], size: int, in_order: bool = False) -> Pattern:

@@ -105,27 +105,23 @@ def mean_answer(mode: Mode) -> tuple[Solution, list[Array]]:
 def neighbour(mode: Mode, harmonic: int) -> System:
     """Another harmonic on the elements of a mode."""
     solution, resonator = solved_as_solid(mode), mode.resonator
-    level, rigid = solution.system.level, 2 if resonator.support == "free" and harmonic < 2 else 0
-    return assemble(resonator, lay_resonator(resonator, mode.harmonic, level), harmonic, level, rigid)
+    level = solution.system.level
+    return assemble(resonator, lay_resonator(resonator, mode.harmonic, level), harmonic, level)
 
 
 def settle(system: System, mode: Mode, load: Array) -> Solution:
     """The static answer K⁻¹ f, without rigid motions: (K + s M) u = f + s M u, again and again, with what f does to them left out."""
     constants = solved_as_solid(mode).constants
-    rigid = system.rigid_motions
-    shift = 1e-2 * constants[0].wave_speed_squared / mode.resonator.size**2 if rigid else 0.0
+    shift = system.shift(constants, mode.resonator.size)
     K, M = system.operators(constants, shift)
     factor = Factor(system.pattern, K)
-    if not rigid:
+    if not shift:
         return Solution(system, constants, factor.solve(np.asfortranarray(load[:, None]))[:, 0])
-    motions, _ = lowest_pairs(factor, M, rigid, DONE)
-    u = answer_without(motions, factor, M, load, shift)
-    if u is None:
-        raise ShellError("the static field caused by a mode or a spin did not converge.")
-    return Solution(system, constants, u)
+    motions, _ = lowest_pairs(factor, M, system.rigid_motions, DONE)
+    return Solution(system, constants, answer_without(motions, factor, M, load, shift))
 
 
-def answer_without(vectors: Array, factor: Factor, M: ElementSum, load: Array, shift: float) -> Array | None:
+def answer_without(vectors: Array, factor: Factor, M: ElementSum, load: Array, shift: float) -> Array:
     """(A - shift M)⁻¹ f of a factor of A, M-orthonormal eigenvectors left out: u = A⁻¹ (f + shift M u), again and again."""
     heavy = M @ vectors
     f = load[:, None]
@@ -136,7 +132,7 @@ def answer_without(vectors: Array, factor: Factor, M: ElementSum, load: Array, s
         u = u - vectors @ (heavy.T @ u)
         if np.max(abs(u - before)) <= DONE * np.max(abs(u)):
             return np.asarray(u[:, 0])
-    return None
+    raise ShellError("a mode lies so near that the answer to a static field or to a spin does not converge.")
 
 
 def check_mount(resonator: Resonator, theory: Theory, harmonic: int) -> None:

@@ -141,10 +141,8 @@ def solve_level(
     Returns them, what the iteration left undone of each, and the factor of the stiffness over `_density`.
     """
     constants = tuple(find_constants(one.table.position, elastic, one.table.plane_stress) for one in system.groups)
-    # a small shift factors the rigid motions and leaves the elastic modes in order
-    shift = 1e-2 * constants[0].wave_speed_squared / size**2 if system.rigid_motions else 0.0
     wanted = count + system.rigid_motions
-    K, mass = system.operators(constants, shift, over=_density(elastic))
+    K, mass = system.operators(constants, system.shift(constants, size), over=_density(elastic))
     factor = Factor(system.pattern, K)
     vectors, undone = lowest_pairs(factor, mass, wanted, accuracy)
     found = [(Solution(system, constants, one), float(left) / 2) for one, left in zip(vectors.T, undone, strict=True)]

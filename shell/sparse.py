@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shell.quadrature import Array
 
 Index = NDArray[np.intp]
+PIVOTING = 0.01  # of matrices that are not definite
 
 
 def assemble_elements(

@@ -65,12 +65,9 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
     g = float(solution.vector @ load) / mass
     # (K - λ M)⁺ f without the mode itself, which all higher modes let converge
     K, M = system.operators(solution.constants)
-    moved = answer_without(
-        solution.vector[:, None] / np.sqrt(mass), Factor(system.pattern, K), M, load, solution.eigenvalue
-    )
-    if moved is None:
-        raise ShellError("the next mode lies so near that its share in the effect of spin does not converge.")
-    others = float((load - (M @ solution.vector[:, None])[:, 0] * g) @ moved)
+    own = solution.vector / np.sqrt(mass)
+    moved = answer_without(own[:, None], Factor(system.pattern, K), M, load, eigenvalue)
+    others = float((load - M @ solution.vector * g) @ moved)
     return SpinShift(
         stiffening / (2 * eigenvalue), -softening / mass / (2 * eigenvalue), g**2 / (2 * eigenvalue) - 2 * others / mass
     )

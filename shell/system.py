@@ -188,12 +188,16 @@ class System:
             for _ in group.unknowns:
                 at = P.indptr[first : (first := first + group.unknowns.shape[1]) + 1]
                 here = slice(at[0], at[-1])
-                yield np.repeat(np.arange(len(at) - 1), np.diff(at)), P.indices[here], P.data[here]
+                yield np.repeat(np.arange(len(at) - 1), np.diff(at)), P.indices[here].astype(np.intp), P.data[here]
 
     @property
     def memory(self) -> float:
         """Bytes of the element matrices while a system is solved: stiffness, mass, their factors."""
         return 32.0 * float(sum(group.unknowns.size * group.unknowns.shape[1] for group in self.groups))
+
+    def shift(self, constants: Sequence[Constants], size: float) -> float:
+        """A small ω² (1/s²) which, with the mass, factors the rigid motions and leaves the elastic modes of a body of radius `size` in order."""
+        return 1e-2 * constants[0].wave_speed_squared / size**2 if self.rigid_motions else 0.0
 
     def operators(
         self, constants: Sequence[Constants], shift: float = 0.0, over: float = 1.0

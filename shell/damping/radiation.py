@@ -21,7 +21,7 @@ from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.kernel import lame
 from shell.quadrature import Array
-from shell.sparse import Index, assemble_elements, factor_symmetric
+from shell.sparse import Index, factor_symmetric
 from shell.system import ElementSum, ShellGroup, SolidGroup, System, restrict
 
 Complex = NDArray[np.complex128]
@@ -72,8 +72,7 @@ class RadiatingBody:
         parts = zip(self.stiffness.blocks, self.mass.blocks, strict=True)
         elements = (one for K, M in parts for one in K - shift * M)
         free = [restrict(one, to) for one, to in zip(elements, self.system.maps, strict=True)]
-        pattern = self.system.pattern
-        return factor_symmetric(assemble_elements(pattern.unknowns, free, pattern.size), 1e-3)
+        return factor_symmetric(self.system.pattern.assemble(free), 1e-3)
 
     def judge(self, v: Complex, eigenvalue: complex) -> Radiating:
         """Frequency and loss of an eigenvector."""

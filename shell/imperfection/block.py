@@ -17,10 +17,8 @@ from shell.cross_section import cut
 from shell.elastic import Constants
 from shell.quadrature import Array
 from shell.resonator import Resonator
-from shell.sparse import Index, assemble_elements, factor_symmetric
+from shell.sparse import PIVOTING, Index, assemble_elements, factor_symmetric
 from shell.system import ElementSum, ShellGroup, System
-
-PIVOTING = 0.01  # of matrices that are not definite
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,21 +56,16 @@ class Block:
         local = np.einsum("f,ca->cfa", here.along[0], table).reshape(3, size)
         return np.asarray((rows.T @ local.T).T)
 
-    def answer(self, loads: Array) -> Array:
-        """(K - λ M)⁻¹ of loads (size, columns); in the pair's own block without the pair, for which it is singular."""
-        if self.kept is None:
-            return self._solve(loads)
-        return self._solve(np.vstack([loads, np.zeros((1, loads.shape[1]))]))[:-1]
-
     @cached_property
-    def _solve(self) -> "Callable[[Array], Array]":
+    def answer(self) -> Callable[[Array], Array]:
+        """(K - λ M)⁻¹ of loads (size, columns); in the pair's own block without the pair, for which it is singular."""
         unknowns, matrices = zip(*self.elements, strict=True)
         A = assemble_elements(unknowns, matrices, self.size)
-        if self.kept is not None:  # a border keeps the answers free of the pair
-            border = abs(A).max() / np.abs(self.kept).max() * self.kept[:, None]
-            beside, below = (scipy.sparse.csc_matrix(side) for side in (border, border.T))
-            A = scipy.sparse.bmat([[A, beside], [below, None]])
-        return factor_symmetric(A, PIVOTING)
+        if self.kept is None:
+            return factor_symmetric(A, PIVOTING)
+        border = abs(A).max() / np.abs(self.kept).max() * self.kept[:, None]  # it keeps the answers free of the pair
+        solve = factor_symmetric(scipy.sparse.bmat([[A, border], [border.T, None]]), PIVOTING)
+        return lambda loads: np.asarray(solve(np.vstack([loads, np.zeros((1, loads.shape[1]))]))[:-1])
 
     def weigh(self, X: Array) -> Array:
         """M times vectors (size, columns), the solid parts moved along."""
@@ -117,7 +110,7 @@ def condense(system: System, constants: tuple[Constants, ...], value: float, pai
         elements.append((shared, around * (felt + felt.T) / 2))
     kept = None
     if pair is not None:
-        pull = np.asarray(mass @ pair[:, None])[:, 0]
+        pull = mass @ pair
         kept = pull[shell]
         kept[shared] += lifted.T @ pull[inside]
     return Block(system, shell, shared, inside, lifted, tuple(elements), around, mass, kept)
