@@ -12,11 +12,10 @@ from shell.elastic import COSINE, SINE, Constants
 from shell.imperfection.block import Block, Together
 from shell.imperfection.field import values_around
 from shell.imperfection.imperfect import Imperfection, fade
-from shell.imperfection.wall import Around, Stretch, Wall, go_around
+from shell.imperfection.wall import ALONG, AROUND, Around, Stretch, Wall, go_around
 from shell.kernel import Section
-from shell.quadrature import Array
+from shell.quadrature import Array, Basis
 
-ALONG, AROUND = [0, 2], [1]  # displacements
 Energies: TypeAlias = Callable[[Block, Block], tuple[Array, Array]]
 """Of two harmonics, what goes as the cosine and what goes as the sine, (shared, shared) each."""
 
@@ -144,11 +143,10 @@ def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta
     found: dict[int, list[Wall]] = {number: [] for number in system.chains}
     for number, walls in found.items():
         group, c = system.chains[number], together.constants[number]
-        table = group.table
         for first in range(0, len(group.unknowns), RUN):
             run = slice(first, min(first + RUN, len(group.unknowns)))
             section = Section(**{name: value[run] for name, value in vars(group.section).items()})
-            here = Stretch(section, c.at(run), run, table.along, orders, table.transverse_shear, theta)
+            here = Stretch(section, c.at(run), run, Basis(*group.table.along), orders, theta)
             stiff, heavy = here.values(flaw.modulus, waves), here.values(flaw.density, waves)
             if any(faces):
                 walls += here.layers(faces, waves, 1 + stiff, 1 + heavy)
@@ -156,9 +154,8 @@ def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta
                 walls.append(here.change(stiff, heavy))
     if flaw.rim:
         edge, _ = free_edge(resonator, system, 1.0)
-        width = values_around(flaw.rim, flaw.rim.orders, np.ones(1), theta)[0]
+        width = values_around(flaw.rim, flaw.rim.orders, np.ones((1, 1)), theta)
         c, at = together.constants[edge.group], slice(edge.element, edge.element + 1)
-        along, shear = edge.along[:, None], edge.table.transverse_shear
-        strip = Stretch(edge.section, c.at((at, slice(-1, None))), at, along, orders, shear, theta).strip(width)
-        found[edge.group].append(strip)
+        here = Stretch(edge.section, c.at((at, slice(-1, None))), at, Basis(*edge.along[:, None]), orders, theta)
+        found[edge.group].append(here.change(width, width))  # a strip as wide
     return found
