@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from shell.assembly import sections
 from shell.errors import ShellError, mm
@@ -32,6 +33,12 @@ class CrossSection:
         """Displacement (3, heights) along tangent, circle and normal."""
         q = unknowns[self.group][self.element][None]
         return np.asarray(self.table.displacements(q)[0, 0])
+
+    def rows(self, plain: "scipy.sparse.csr_matrix") -> Array:
+        """Displacement at the first height per unit of what `plain` takes to the group's element unknowns, (3, columns)."""
+        local = np.einsum("f,ca->cfa", self.along[0], self.table.displacement[0, 0, :, 0]).reshape(3, -1)
+        first = self.element * local.shape[1]
+        return np.asarray((plain[first : first + local.shape[1]].T @ local.T).T)
 
 
 def cut(resonator: Resonator, system: System, position: float, heights: Array) -> CrossSection:

@@ -43,15 +43,16 @@ class ShellGroup:
             found[element] = integrate(stations[[element]], along)[0]
         return found
 
-    def spread(self, raw: Array) -> Array:
-        """Unknowns (elements, size) of the plain basis."""
-        unknowns = raw[self.unknowns]
+    def plain(self, size: int) -> "scipy.sparse.csr_matrix":
+        """From all raw unknowns, so many, to those of the elements in the plain basis, where nothing is a difference."""
+        number = np.arange(self.unknowns.size).reshape(len(self.unknowns), self.table.along.shape[2], -1)
+        rows, of = [number.ravel()], [number.ravel()]
         for element, node in self.anchors:
-            amplitudes = unknowns[element].reshape(self.table.along.shape[2], -1)
-            inner = amplitudes[node].copy()
-            amplitudes += inner
-            amplitudes[node] = inner
-        return np.asarray(unknowns)
+            others = np.delete(number[element], node, axis=0)
+            rows.append(others.ravel())
+            of.append(np.broadcast_to(number[element, node], others.shape).ravel())
+        to, raw = np.concatenate(rows), self.unknowns.ravel()[np.concatenate(of)]
+        return scipy.sparse.csr_matrix((np.ones(len(to)), (to, raw)), shape=(number.size, size))
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -72,12 +73,6 @@ class ShellGroup:
             one[..., None] * section.thickness[..., None] * eta / 2 for one in (section.tangent_z, section.tangent_r)
         )
         return np.array([section.r[..., None] - out_r, section.z[..., None] + out_z])
-
-    def gather(self, loads: Array) -> Array:
-        """Loads (elements, functions, amplitudes) on the unknowns (elements, size) that are solved for."""
-        for element, node in self.anchors:
-            loads[element, node] = loads[element].sum(axis=0)
-        return loads.reshape(self.unknowns.shape)
 
     @cached_property
     def stations(self) -> tuple[Array, Array, Array]:
@@ -102,9 +97,10 @@ class SolidGroup:
     boundary: Support
     signs: Array  # (cells, functions), which turn the cells' edges the same way
 
-    def spread(self, raw: Array) -> Array:
-        """Unknowns (cells, size) of functions as they are in each cell."""
-        return np.asarray(raw[self.unknowns] * np.repeat(self.signs, 3, axis=1))
+    def plain(self, size: int) -> "scipy.sparse.csr_matrix":
+        """From all raw unknowns, so many, to those of functions as they are in each cell."""
+        signs, to = np.repeat(self.signs, 3, axis=1).ravel(), np.arange(self.unknowns.size)
+        return scipy.sparse.csr_matrix((signs, (to, self.unknowns.ravel())), shape=(len(to), size))
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -118,10 +114,6 @@ class SolidGroup:
         """See `ShellGroup.places`."""
         points = gauss(self.mesh.grid.shape[2] + 1)[0]
         return self.mesh.place(points, points).reshape(2, *self.table.volume.shape)
-
-    def gather(self, loads: Array) -> Array:
-        """Loads (cells, functions, 3) of functions as they are in each cell, on the unknowns (cells, size)."""
-        return (loads * self.signs[..., None]).reshape(self.unknowns.shape)
 
     @property
     def products(self) -> Array:
@@ -223,17 +215,18 @@ class System:
         choice = self.constraint[np.concatenate([group.unknowns.ravel() for group in self.groups])]
         return choice, scipy.sparse.csr_matrix(choice.T)
 
+    @cached_property
+    def plain(self) -> "list[scipy.sparse.csr_matrix]":
+        """From the free unknowns to those that the tables of every group take, (elements × size)."""
+        return [group.plain(self.constraint.shape[0]) @ self.constraint for group in self.groups]
+
     def spread(self, free: Array) -> list[Array]:
         """Element unknowns (elements, size) of every group from the free unknowns of one vector."""
-        raw = self.constraint @ free
-        return [group.spread(raw) for group in self.groups]
+        return [(P @ free).reshape(group.unknowns.shape) for P, group in zip(self.plain, self.groups, strict=True)]
 
     def gather(self, loads: list[Array]) -> Array:
         """Loads on the free unknowns from those on the functions of every group."""
-        raw = np.zeros(self.constraint.shape[0])
-        for group, own in zip(self.groups, loads, strict=True):
-            np.add.at(raw, group.unknowns, group.gather(own))
-        return np.asarray(self.constraint.T @ raw)
+        return np.asarray(sum(P.T @ own.ravel() for P, own in zip(self.plain, loads, strict=True)))
 
 
 def restrict(matrix: NDArray[Any], to: NDArray[Any]) -> NDArray[Any]:

@@ -7,12 +7,13 @@ import numpy as np
 
 from shell.assembly import assemble, lay_resonator
 from shell.blocks import mesh_solid
+from shell.cross_section import cut
 from shell.damping.radiation import Layer, Radiating, RadiatingBody, assemble_waves, radiating_mode
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.modes import Mode
 from shell.patches import Patch, box, whole
-from shell.quadrature import Array, legendre
+from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Solution, total
 from shell.system import System
@@ -67,10 +68,8 @@ def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic) -> Unbalance:
     if solution.system.n != 2:
         raise ShellError("only the first and third harmonics of the rim's mass couple a mode with n = 2 to the stem.")
     system, waves = _stand(mode, elastic, None, 1)
-    raw = solution.system.constraint @ solution.vector
-    radial, around, axial = (float(row @ raw) for row in _rim(mode.resonator, solution.system))
-    rows = np.array(_rim(mode.resonator, system)) @ system.constraint
-    loads = np.array([[radial, sign * around, axial] for sign in (1, -1)]) @ rows / (2 * np.pi)
+    radial, around, axial = _rim(mode.resonator, solution.system) @ solution.vector
+    loads = np.array([[radial, sign * around, axial] for sign in (1, -1)]) @ _rim(mode.resonator, system) / (2 * np.pi)
     solve = waves.factor(complex(solution.eigenvalue))
     moved = np.array([solve((solution.eigenvalue * load).astype(complex)) for load in loads])
     alpha = -np.imag(loads @ moved.T) / total(solution.kinetic)
@@ -112,24 +111,14 @@ def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, 
     return system, assemble_waves(system, (elastic, base), bases, layer)
 
 
-def _rim(resonator: Resonator, system: System) -> list[Array]:
-    """Radial, circumferential and axial motion of the middle surface at the free rim, as rows over the raw unknowns."""
-    group = [*system.chains.values()][-1]
-    if group.chain.ends[1] != "free":
+def _rim(resonator: Resonator, system: System) -> Array:
+    """Radial, circumferential and axial motion of the middle surface at the free rim, as rows over the free unknowns."""
+    if [*system.chains.values()][-1].chain.ends[1] != "free":
         raise ShellError("an imbalance of the rim needs a free rim.")
-    orders, element = system.level.through, len(group.unknowns) - 1
-    width = sum(orders) + 3
-    ends = [group.unknowns[element, -width:]]
-    ends += [group.unknowns[k, node * width : (node + 1) * width] for k, node in group.anchors if k == element]
-    along, turned, normal = (np.zeros(system.constraint.shape[0]) for _ in range(3))
-    for unknowns in ends:  # in an anchored element the end is a sum of the anchor and a difference
-        first = 0
-        for row, order in zip((along, turned, normal), orders, strict=True):
-            row[unknowns[first : first + order + 1]] += legendre(order, np.zeros(1)).values[0]
-            first += order + 1
-    rim = resonator.at([resonator.length], len(resonator.segments) - 1)
-    t_r, t_z = float(rim.tangent_r[0]), float(rim.tangent_z[0])
-    return [t_r * along - t_z * normal, turned, t_z * along + t_r * normal]
+    rim = cut(resonator, system, 1.0, np.zeros(1))
+    along, turned, normal = rim.rows(system.plain[rim.group])
+    t_r, t_z = float(rim.section.tangent_r[0, 0]), float(rim.section.tangent_z[0, 0])
+    return np.array([t_r * along - t_z * normal, turned, t_z * along + t_r * normal])
 
 
 def lay_half_space(radii: list[float], surface: float, below: bool, wavelength: float) -> tuple[list[Patch], Layer]:

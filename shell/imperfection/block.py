@@ -43,18 +43,12 @@ class Block:
     @cached_property
     def spreads(self) -> "dict[int, scipy.sparse.csr_matrix]":
         """From the unknowns to those of the elements of every chain of shell, in the plain basis."""
-        P = self.system.constraint
-        return {number: _plain(group, P)[:, self.shell] for number, group in self.system.chains.items()}
+        return {number: self.system.plain[number][:, self.shell] for number in self.system.chains}
 
     def moves(self, resonator: Resonator, position: float, height: float) -> Array:
         """Displacements u, v, w of a place, at a height -1 (inner) ... 1 (outer face), per unit of every unknown, (3, size)."""
         here = cut(resonator, self.system, position, np.array([resonator.outward * height]))
-        table = here.table.displacement[0, 0, :, 0]
-        spread = self.spreads[here.group]
-        size = spread.shape[0] // len(self.system.groups[here.group].unknowns)
-        rows = spread[here.element * size : (here.element + 1) * size]
-        local = np.einsum("f,ca->cfa", here.along[0], table).reshape(3, size)
-        return np.asarray((rows.T @ local.T).T)
+        return here.rows(self.spreads[here.group])
 
     @cached_property
     def answer(self) -> Callable[[Array], Array]:
@@ -76,8 +70,8 @@ class Block:
 
     def inner(self, number: int) -> Array:
         """What a unit of each shared unknown moves in a solid part: (shared, cells, size) in the plain basis."""
-        raw = self.system.constraint @ self._moved(np.eye(self.size)[:, self.shared])
-        return np.array([self.system.groups[number].spread(column) for column in raw.T])
+        moved = self.system.plain[number] @ self._moved(np.eye(self.size)[:, self.shared])
+        return np.asarray(moved.T.reshape(-1, *self.system.groups[number].unknowns.shape))
 
     def _moved(self, X: Array) -> Array:
         """All free unknowns of vectors."""
@@ -114,20 +108,6 @@ def condense(system: System, constants: tuple[Constants, ...], value: float, pai
         kept = pull[shell]
         kept[shared] += lifted.T @ pull[inside]
     return Block(system, shell, shared, inside, lifted, tuple(elements), around, mass, kept)
-
-
-def _plain(group: ShellGroup, constraint: "scipy.sparse.csr_matrix") -> "scipy.sparse.csr_matrix":
-    """Rows of the constraint for the unknowns of a chain's elements, its small elements out of their differences."""
-    functions = group.table.along.shape[2]
-    count, number = group.unknowns.size, np.arange(group.unknowns.size).reshape(len(group.unknowns), functions, -1)
-    to, of = [number.ravel()], [number.ravel()]
-    for element, node in group.anchors:
-        others = np.delete(number[element], node, axis=0)
-        to.append(others.ravel())
-        of.append(np.broadcast_to(number[element, node], others.shape).ravel())
-    rows, columns = np.concatenate(to), group.unknowns.ravel()[np.concatenate(of)]
-    sums = scipy.sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, constraint.shape[0]))
-    return scipy.sparse.csr_matrix(sums @ constraint)
 
 
 WORKSPACE = 1 << 19  # numbers that a solve uses and frees again
