@@ -6,7 +6,7 @@ and the shell feels A_II + A_Ii W. What an imperfection does inside a solid part
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from math import pi
 
@@ -124,7 +124,7 @@ class Together:
         self.size = int(ends[-1])
         self.rows = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         np.empty(WORKSPACE)  # freed at once, so that the process keeps the memory of each solve for the next
-        self._places: dict[tuple[float, float], tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]] = {}
+        self.moves = lru_cache(PLACES)(self._find_moves)
 
     @cached_property
     def spreads(self) -> "dict[int, tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]]":
@@ -149,15 +149,11 @@ class Together:
         rows = loads.transpose(4, 1, 2, 0, 3, 5).reshape(-1, 2 * vectors)
         return np.asarray(self.spreads[number][1] @ rows).reshape(self.size, vectors, 2)
 
-    def moves(self, position: float, height: float) -> "tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]":
+    def _find_moves(self, position: float, height: float) -> "tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]":
         """Displacements u, v, w of a place in every harmonic per unit of every unknown, (3 harmonics, size), and the transpose."""
-        if (position, height) not in self._places:
-            if len(self._places) >= PLACES:
-                self._places.clear()
-            rows = [block.moves(self.resonator, position, height) for block in self.blocks]
-            whole = scipy.sparse.csr_matrix(scipy.sparse.block_diag([scipy.sparse.csr_matrix(one) for one in rows]))
-            self._places[position, height] = whole, scipy.sparse.csr_matrix(whole.T)
-        return self._places[position, height]
+        rows = [scipy.sparse.csr_matrix(block.moves(self.resonator, position, height)) for block in self.blocks]
+        whole = scipy.sparse.csr_matrix(scipy.sparse.block_diag(rows))
+        return whole, scipy.sparse.csr_matrix(whole.T)
 
     def answer(self, loads: Array) -> Array:
         """-(K - λ M)⁻¹ of loads in every harmonic; in the pair's own without the pair, for which it is singular."""

@@ -1,12 +1,12 @@
 """The difference between the imperfect and the perfect resonator: products of δK and δM with vectors, by quadrature."""
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from math import pi
 from typing import TypeAlias
 
 import numpy as np
 
-from shell.cells import CellTable
 from shell.cross_section import free_edge
 from shell.elastic import COSINE, SINE, Constants
 from shell.imperfection.block import Block, Together
@@ -28,8 +28,7 @@ class Core:
 
     def __init__(self, number: int, constants: Constants) -> None:
         self.number, self.constants = number, constants
-        self._sections: dict[int, tuple[Array, Array]] = {}
-        self._products: dict[tuple[int, int], tuple[Array, ...]] = {}
+        self._section, self._energies = cache(self._find_section), cache(self._find_energies)
 
     def respond(self, X: Array, energies: Energies, weight: Array, around: Around, together: Together) -> Array:
         """What a change of its material does to vectors (unknowns, vectors, 2)."""
@@ -54,29 +53,18 @@ class Core:
         """Energies of displacements per s⁻²."""
         return self._energies(one, other)[2:]  # type: ignore[return-value]
 
-    def _energies(self, one: Block, other: Block) -> tuple[Array, ...]:
-        key = one.system.n, other.system.n
-        if key not in self._products:
-            (e, d), (f, g), table = self._section(one), self._section(other), self._table(one)
-            volume = table.volume[:, :, None]
-            stress = self.constants.stress(table, f) * volume
-            momentum = self.constants.rho[..., None, None] * volume * g
-            pairs = [(e, stress, some) for some in (COSINE, SINE)] + [(d, momentum, some) for some in (ALONG, AROUND)]
-            self._products[key] = tuple(_flat(a[..., some, :]) @ _flat(b[..., some, :]).T for a, b, some in pairs)
-        return self._products[key]
+    def _find_energies(self, one: Block, other: Block) -> tuple[Array, ...]:
+        (e, d), (f, g), table = self._section(one), self._section(other), one.system.solids[self.number].table
+        volume = table.volume[:, :, None]
+        stress = self.constants.stress(table, f) * volume
+        momentum = self.constants.rho[..., None, None] * volume * g
+        pairs = [(e, stress, some) for some in (COSINE, SINE)] + [(d, momentum, some) for some in (ALONG, AROUND)]
+        return tuple(_flat(a[..., some, :]) @ _flat(b[..., some, :]).T for a, b, some in pairs)
 
-    def _table(self, block: Block) -> CellTable:
-        return block.system.solids[self.number].table
-
-    def _section(self, block: Block) -> tuple[Array, Array]:
+    def _find_section(self, block: Block) -> tuple[Array, Array]:
         """Strains and displacements per unit of every shared unknown."""
-        if block.system.n not in self._sections:
-            table, moved = self._table(block), block.inner(self.number)
-            self._sections[block.system.n] = (
-                np.array([table.strains(one) for one in moved]),
-                np.array([table.displacements(one) for one in moved]),
-            )
-        return self._sections[block.system.n]
+        table, moved = block.system.solids[self.number].table, block.inner(self.number)
+        return np.array([table.strains(one) for one in moved]), np.array([table.displacements(one) for one in moved])
 
 
 def _flat(fields: Array) -> Array:

@@ -15,7 +15,7 @@ the next answers the forces r = A T that the first has left. A last round of ans
 folded A by rᵀ x but for the imperfection's own share of that.
 """
 
-from functools import cached_property
+from functools import cache, cached_property, lru_cache
 from math import pi, sqrt
 
 import numpy as np
@@ -53,8 +53,7 @@ class CoupledHarmonics:
         self.elastic = elastic
         self.level: Level = mode.solution.system.level
         self.resonator: Resonator = mode.resonator
-        self._blocks: dict[int, Block] = {}
-        self._together: dict[tuple[int, ...], Together] = {}
+        self.block, self.together = cache(self._condense), lru_cache(KEPT)(self._join)
 
     def system(self, k: int) -> System:
         """The elements of the perfect resonator at one harmonic, the same for all."""
@@ -73,25 +72,19 @@ class CoupledHarmonics:
         found = solved[self.mode.index]
         return found.eigenvalue, found.vector / sqrt(found.mass)
 
-    def block(self, k: int) -> Block:
+    def _condense(self, k: int) -> Block:
         """One harmonic, its solid parts condensed."""
-        if k not in self._blocks:
-            value, vector = self.pair
-            self._blocks[k] = condense(self.system(k), self.constants, value, vector if k == self.n else None)
-        return self._blocks[k]
+        value, vector = self.pair
+        return condense(self.system(k), self.constants, value, vector if k == self.n else None)
 
     @cached_property
     def cores(self) -> tuple[Core, ...]:
         """The solid parts."""
         return tuple(Core(k, self.constants[k]) for k in self.system(self.n).solids)
 
-    def together(self, harmonics: tuple[int, ...]) -> Together:
+    def _join(self, harmonics: tuple[int, ...]) -> Together:
         """Several of them side by side."""
-        if harmonics not in self._together:
-            if len(self._together) >= KEPT:
-                self._together.clear()
-            self._together[harmonics] = Together([self.block(k) for k in harmonics], self.resonator, self.constants)
-        return self._together[harmonics]
+        return Together([self.block(k) for k in harmonics], self.resonator, self.constants)
 
     def solve(self, imperfection: Imperfection, tolerance: float = 1e-6, rounds: int = MOST) -> Split:
         """The split with every order of the imperfection, but the first in the height of the rim's edge, to a relative tolerance."""

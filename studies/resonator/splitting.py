@@ -70,7 +70,7 @@ class SplitPair:
             return self.split
         _, elastic = self.instrument.at(self.temperature)
         with naming(f"{self.instrument.path} [imperfection]"):
-            own = _coupled(self.mode, elastic).solve(self._fields)
+            own = _coupled(self.mode, self.mode.resonator, elastic).solve(self._fields)
         return self._sum(own, self.measured, self.electrodes)
 
     @property
@@ -113,18 +113,10 @@ def solved_pair(resonator: Resonator, elastic: Elastic, harmonic: int) -> Pair:
     return Pair(solve_lowest(resonator, elastic, harmonic, "solid"))
 
 
-_PREPARED: dict[tuple[object, ...], CoupledHarmonics] = {}
-MOST_PREPARED = 4
-
-
-def _coupled(mode: Mode, elastic: Elastic) -> CoupledHarmonics:
+@lru_cache(maxsize=4)
+def _coupled(mode: Mode, resonator: Resonator, elastic: Elastic) -> CoupledHarmonics:
     """The coupled harmonics of a pair, prepared once for all imperfections of one perfect resonator."""
-    key = (mode.resonator, elastic, mode.harmonic, mode.index, mode.theory, mode.solution.system.level)
-    if key not in _PREPARED:
-        if len(_PREPARED) >= MOST_PREPARED:
-            _PREPARED.clear()
-        _PREPARED[key] = CoupledHarmonics(mode, elastic)
-    return _PREPARED[key]
+    return CoupledHarmonics(mode, elastic)
 
 
 @lru_cache(maxsize=64)
