@@ -8,9 +8,11 @@ hexahedra, and wedges where a side lies on the axis. All nodes lie on the true s
 """
 
 import io
+import tempfile
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -221,15 +223,9 @@ def _encode_vtu(mesh: Volume) -> bytes:
     held = np.zeros(len(mesh.nodes), dtype=np.uint8)
     held[mesh.held] = 1
     grid.point_data["held"] = held
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
-
-    writer = vtkXMLUnstructuredGridWriter()
-    writer.SetInputData(grid)
-    writer.SetDataModeToBinary()
-    writer.WriteToOutputStringOn()
-    if not writer.Write():
-        raise ShellError("VTK cannot write this mesh.")
-    return str(writer.GetOutputString()).encode()
+    with tempfile.TemporaryDirectory() as folder:
+        grid.save(path := Path(folder, "mesh.vtu"))
+        return path.read_bytes()
 
 
 def _encode_msh(mesh: Volume) -> bytes:

@@ -159,22 +159,20 @@ class PairBasis:
 
     def __init__(self, body: Body, value: float) -> None:
         self.body, self.value = body, value
-        self.rounds: list[tuple[Array, Array, Array]] = []  # vectors X with A X and M X
-        self.A = self.M = np.zeros((0, 0))
+        self.X = self.force = self.mass = np.zeros(
+            (body.together.size, 0, 2)
+        )  # vectors, A X and M X, (unknowns, basis, 2)
 
     def extend(self, X: Array, load: Array) -> None:
         """Add two vectors (unknowns, 2, 2) with what the perfect body's A makes of them (but for what holds back the pair)."""
         change, mass = self.body.respond(X, self.value)
-        self.rounds.append((X, load + change, mass))
-        self.A, self.M = (
-            _border(old, [products(one[kind], X) for one in self.rounds]) for old, kind in ((self.A, 1), (self.M, 2))
-        )
+        grown = ((self.X, X), (self.force, load + change), (self.mass, mass))
+        self.X, self.force, self.mass = (np.concatenate(both, axis=1) for both in grown)
+        self.A, self.M = (_symmetric(products(loads, self.X)) for loads in (self.force, self.mass))
 
     def forces(self, T: Array) -> Array:
         """A of combinations T (basis, 2) of the vectors."""
-        both = np.kron(T, np.eye(2)).reshape(-1, 4, 4)
-        found = sum(force.reshape(-1, 4) @ w for (_, force, _), w in zip(self.rounds, both, strict=True))
-        return np.asarray(found).reshape(-1, 2, 2)
+        return np.asarray(np.einsum("ubc,bv->uvc", self.force, T))
 
     def fold(self, at: float = 0.0) -> tuple[Array, Array, Array]:
         """A at λ + at on the pair with the rest folded onto it, T, and Tᵀ M T."""
@@ -185,14 +183,11 @@ class PairBasis:
 
 
 def products(one: Array, other: Array) -> Array:
-    """Of two times two vectors, (2, 2)."""
-    return np.asarray(np.einsum("vcwc->vw", (one.reshape(-1, 4).T @ other.reshape(-1, 4)).reshape(2, 2, 2, 2)))
+    """Of vectors (unknowns, vectors, 2) with others."""
+    return np.asarray(np.tensordot(one, other, ((0, 2), (0, 2))))
 
 
-def _border(old: Array, columns: list[Array]) -> Array:
-    """A symmetric matrix grown by two columns."""
-    last = (columns[-1] + columns[-1].T) / 2
-    if not len(old):
-        return last
-    side = np.concatenate(columns[:-1])
-    return np.block([[old, side], [side.T, last]])
+def _symmetric(P: Array) -> Array:
+    """Of products of loads with vectors, two a round, those of the earlier round's loads: the later ones lack what holds back the pair."""
+    rounds = np.arange(len(P)) // 2
+    return np.where(rounds[:, None] == rounds, (P + P.T) / 2, np.where(rounds[:, None] < rounds, P, P.T))

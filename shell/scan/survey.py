@@ -8,7 +8,7 @@ left out. The noise is what the fit leaves between the cells, so that form which
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -71,7 +71,11 @@ class Face:
     @cached_property
     def field(self) -> Field:
         """Its waves as a field, constant beyond the covered positions."""
-        return Field(tuple((m, 1.0, (_Profile(self, m),)) for m in range(self.waves.highest + 1)))
+        return Field(tuple((m, 1.0, (partial(self._wave, m),)) for m in range(self.waves.highest + 1)))
+
+    def _wave(self, order: int, position: Array) -> Complex:
+        """One wave along the meridian, m."""
+        return np.asarray(self.waves.along(position) @ self.coefficients[order])
 
     def project(self, density: Density, order: int) -> tuple[complex, Array]:
         """Σ density c_order over the shell and the covariance of its real and imaginary part."""
@@ -82,7 +86,16 @@ class Face:
         return self._weigh(np.array([position]), np.ones(1), order)
 
     def _weigh(self, position: Array, weight: Array, order: int) -> tuple[complex, Array]:
-        found, covariance = self._combine(weight @ self.waves.along(position), order)
+        if order > self.waves.highest:
+            raise ShellError(f"harmonics are fitted up to {self.waves.highest}; harmonic {order} is beyond.")
+        L = weight @ self.waves.along(position)
+        count = len(L)
+        first = order * 2 * count - count if order else 0
+        rows = np.zeros((2, len(self.covariance)))
+        rows[0, first : first + count] = L
+        if order:
+            rows[1, first + count : first + 2 * count] = L
+        found, covariance = complex(self.coefficients[order] @ L), rows @ self.covariance @ rows.T
         if self.span is None or self.motion is None:
             return found, covariance
         turned = (complex(weight @ turn) for turn in self._turns(self.span, position, order))
@@ -102,32 +115,10 @@ class Face:
             turn[first : first + count, first : first + count] = keep
         return replace(self, coefficients=coefficients, covariance=turn @ self.covariance @ turn.T)
 
-    def _combine(self, L: Array, order: int) -> tuple[complex, Array]:
-        if order > self.waves.highest:
-            raise ShellError(f"harmonics are fitted up to {self.waves.highest}; harmonic {order} is beyond.")
-        count = len(L)
-        first = order * 2 * count - count if order else 0
-        rows = np.zeros((2, len(self.covariance)))
-        rows[0, first : first + count] = L
-        if order:
-            rows[1, first + count : first + 2 * count] = L
-        return complex(self.coefficients[order] @ L), rows @ self.covariance @ rows.T
-
     def profile(self, position: Array, azimuth: Array, first: int = 0) -> Array:
         """δ around circles, (positions, azimuths), m; of the waves from the `first` on."""
         c, m = self.waves.along(position) @ self.coefficients.T, np.arange(first, self.waves.highest + 1)
         return np.asarray((c[:, first:] @ np.exp(-1j * np.multiply.outer(m, azimuth))).real)
-
-
-@dataclass(frozen=True, eq=False)
-class _Profile:
-    """One wave of a face along the meridian."""
-
-    face: Face
-    order: int
-
-    def __call__(self, position: Array) -> Complex:
-        return np.asarray(self.face.waves.along(position) @ self.face.coefficients[self.order])
 
 
 def most_waves(count: int) -> int:
