@@ -101,15 +101,6 @@ class Family:
         frequency = np.exp(found[:, 0]) * np.sqrt(np.asarray(E) / np.asarray(rho)) / np.asarray(growth)
         return FamilyResult(np.broadcast_to(frequency, len(x)), *found.T[1:])
 
-    def slope(self, values: ArrayLike, *, nu: ArrayLike, name: str) -> Array:
-        """∂ ln f by one axis, per unit of its name, of m designs."""
-        x = self._unit(values, nu)
-        varied = {axis.name: axis for axis in _with_ratio(self.axes, self.nu) if axis.varies}
-        if name not in varied:
-            raise ShellError(f"the family has no axis '{name}'; it has {', '.join(varied) or 'none'}.")
-        axis = varied[name]
-        return np.asarray(self.polynomial(x, [*varied].index(name))[:, 0] * 2 / (axis.high - axis.low))
-
     def _unit(self, values: ArrayLike, nu: ArrayLike) -> Array:
         """Return the points of the cube (m, coordinates)."""
         given = np.atleast_2d(np.asarray(values, dtype=float))

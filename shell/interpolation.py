@@ -32,18 +32,11 @@ def leja_points() -> Array:
     return np.array(points)
 
 
-def tabulate(x: Array, count: int) -> tuple[Array, Array]:
-    """N_0 … N_{count−1} at points (m,) and their derivatives, each (count, m)."""
-    points = leja_points()
-    values, slopes = np.ones((count, *x.shape)), np.zeros((count, *x.shape))
-    for j in range(1, count):
-        values[j] = values[j - 1] * (x - points[j - 1])
-        slopes[j] = slopes[j - 1] * (x - points[j - 1]) + values[j - 1]
-    for j in range(1, count):
-        largest = np.prod(points[j] - points[:j])
-        values[j] /= largest
-        slopes[j] /= largest
-    return values, slopes
+def tabulate(x: Array, count: int) -> Array:
+    """N_0 … N_{count−1} at points (m,), (count, m)."""
+    points = leja_points()[: count - 1, None]
+    products = np.cumprod(np.concatenate([np.ones((1, len(x))), x - points]), axis=0)
+    return np.asarray(products / [[np.prod(point - points[:j])] for j, point in enumerate(leja_points()[:count])])
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +46,10 @@ class SparsePolynomial:
     indices: tuple[Index, ...]  # in lexical order
     surpluses: Array  # (terms, outputs)
 
-    def __call__(self, x: Array, along: int | None = None) -> Array:
-        """Values (m, outputs) at points (m, dimensions), or derivatives by the coordinate `along`; no point depends on the others."""
-        tables = []
-        for axis, column in enumerate(x.T):
-            values, slopes = tabulate(column, 1 + max(index[axis] for index in self.indices))
-            tables.append(slopes if axis == along else values)
+    def __call__(self, x: Array) -> Array:
+        """Values (m, outputs) at points (m, dimensions); no point depends on the others."""
+        counts = (1 + max(index[axis] for index in self.indices) for axis in range(x.shape[1]))
+        tables = [tabulate(column, count) for column, count in zip(x.T, counts, strict=True)]
         found = np.zeros((self.surpluses.shape[1], len(x)))
         products = [np.ones(len(x))]  # of the factors up to each axis: neighbours share the first ones
         last: Index = ()

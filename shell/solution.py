@@ -24,11 +24,6 @@ class EnergyFractions:
     stem: float  # of the stem
     kinetic_stem: float  # the stem's share of the kinetic energy (counted apart)
 
-    @property
-    def shell(self) -> float:
-        """The shell's share of the strain energy."""
-        return self.bending + self.membrane + self.shear
-
 
 @dataclass(frozen=True, eq=False)
 class AlongMeridian:

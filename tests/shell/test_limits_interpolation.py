@@ -1,4 +1,4 @@
-"""The sparse interpolant in its exact limits: polynomials, bounded basis, derivatives, and what it must not promise."""
+"""The sparse interpolant in its exact limits: polynomials, bounded basis, and what it must not promise."""
 
 import numpy as np
 import pytest
@@ -9,9 +9,9 @@ from shell.interpolation import MOST_POINTS, Exploration, leja_points, tabulate
 def test_every_basis_function_is_one_at_its_point_and_nowhere_larger():
     points = leja_points()
     assert len(np.unique(points)) == MOST_POINTS
-    values, _ = tabulate(np.linspace(-1, 1, 4001), 20)
+    values = tabulate(np.linspace(-1, 1, 4001), 20)
     assert abs(values).max() <= 1 + 1e-6
-    at_points, _ = tabulate(points[:20], 20)
+    at_points = tabulate(points[:20], 20)
     assert np.diag(at_points) == pytest.approx(np.ones(20))
     assert abs(np.triu(at_points.T, 1).T - np.tril(at_points, -1)).max() < 1e-12
 
@@ -29,9 +29,6 @@ def test_a_polynomial_is_found_exactly_from_as_many_points_as_it_has_terms():
     x = np.random.default_rng(1).uniform(-1, 1, (200, 3))
     polynomial = grid.polynomial()
     np.testing.assert_allclose(polynomial(x), np.array([quartic(row) for row in x]), atol=1e-13)
-    a, b, c = x.T
-    np.testing.assert_allclose(polynomial(x, 0)[:, 0], 2 - 4 * a**3 + 3 * b + 0.5 * b * c + c, atol=1e-12)
-    np.testing.assert_allclose(polynomial(x, 1)[:, 1], c, atol=1e-12)
 
 
 def test_an_analytic_function_of_many_numbers_spends_its_points_where_they_matter():
