@@ -420,7 +420,7 @@ def test_recovery_of_a_frequency_that_goes_with_the_amplitude(hardening, sd, rat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("line", [50.0, 4617.3, 7321.0])
+@pytest.mark.parametrize("line", [50.0, 7321.0])
 def test_interference_is_named_at_its_own_frequency(line):
     """Blocks of eight periods fold it beside the carrier, where 50 Hz was named as 4650 Hz."""
     random = np.random.default_rng(int(line))
@@ -501,7 +501,7 @@ def test_a_frequency_given_that_is_of_no_line_is_refused_and_another_line_is_not
             mix_down(time, x, given)
 
 
-@pytest.mark.parametrize("part", [0.0, 0.6, 0.72, 0.8])
+@pytest.mark.parametrize("part", [0.0, 0.72])
 def test_the_window_of_a_line_off_the_reference_is_the_whole_decay(part):
     """Turns from row to row were taken for noise: of 400 s, 31 s were used where the line was 0.72 of half the rows a second away."""
     random, time = np.random.default_rng(4), np.arange(0.0, 400.0, 0.2)

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 
 from shell.curves import Arc, Hyperbola, Line
-from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.meridian import bell, cylinder, hemisphere, meridian
 from shell.modes import solve_modes
 from shell.resonator import Resonator, Stem
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
+from tests.shell.samples import DOME, SILICA
 
 
 def test_hemisphere_is_a_sphere() -> None:
-    points = hemisphere(15e-3, 0.9e-3).sample(31)
+    points = DOME.sample(31)
     phi = np.linspace(0, pi / 2, 31)
     assert points.r == pytest.approx(15e-3 * np.sin(phi))
     assert points.z == pytest.approx(15e-3 * np.cos(phi))

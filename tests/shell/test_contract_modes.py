@@ -6,16 +6,13 @@ from math import pi
 import numpy as np
 import pytest
 
-from shell.elastic import Elastic, VaryingElastic
+from shell.elastic import VaryingElastic
 from shell.errors import ShellError
 from shell.materials import find_material
 from shell.meridian import cylinder, hemisphere
 from shell.modes import TheoryRangeWarning, solve_modes
 from shell.resonator import Resonator, Stem
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
-DOME = hemisphere(radius=15e-3, thickness=0.9e-3)
-STEMMED = hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3, fillet=0.5e-3))
+from tests.shell.samples import DOME, SILICA, STEMMED
 
 
 def test_axisymmetric_modes_are_labelled_and_do_not_precess() -> None:

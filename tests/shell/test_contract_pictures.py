@@ -11,7 +11,6 @@ import pytest
 from PIL import Image
 
 import shell.render
-from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
@@ -20,9 +19,9 @@ from shell.resonator import Stem
 from shell.scene import compose_scene
 from shell.still import draw_still
 from shell.surface import build_surface
+from tests.shell.samples import SILICA
 
 RESONATOR = hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3, 0.5e-3))
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
 
 
 @lru_cache

@@ -17,8 +17,7 @@ from shell.meridian import bell, cylinder, hemisphere, meridian
 from shell.modes import TheoryRangeWarning, solve_modes
 from shell.refinement import choose_finer, solve_level
 from shell.resonator import Resonator, Stem, Support
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
+from tests.shell.samples import SILICA
 
 
 def random_design(rng: np.random.Generator) -> tuple[Resonator, Elastic, int]:

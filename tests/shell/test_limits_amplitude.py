@@ -3,12 +3,10 @@
 import pytest
 
 from shell.duffing import amplitude_shift
-from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.meridian import cylinder, hemisphere
 from shell.modes import TheoryRangeWarning, solve_modes
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
+from tests.shell.samples import DOME, SILICA
 
 
 def ring(n: int) -> float:
@@ -34,7 +32,7 @@ def test_a_thin_ring_softens_as_an_inextensible_one(n: int) -> None:
 
 def test_a_free_dome_as_another_code_has_it() -> None:
     """NGSolve, polynomials of order 6, energies summed over azimuths: -323.4011 per m² (tests/benchmarks/finite_ngsolve.py of 722ba988)."""
-    (mode,) = solve_modes(hemisphere(15e-3, 0.9e-3), SILICA)
+    (mode,) = solve_modes(DOME, SILICA)
     assert amplitude_shift(mode).total == pytest.approx(-323.4011, rel=1e-4)
 
 
@@ -46,9 +44,9 @@ def test_a_mode_at_twice_the_frequency_is_said() -> None:
 
 
 def test_modes_that_have_no_such_number_are_refused() -> None:
-    (mode,) = solve_modes(hemisphere(15e-3, 0.9e-3), SILICA, theory="shell")
+    (mode,) = solve_modes(DOME, SILICA, theory="shell")
     with pytest.raises(ShellError, match="solid theory"):
         amplitude_shift(mode)
-    (mode,) = solve_modes(hemisphere(15e-3, 0.9e-3), SILICA, 1)
+    (mode,) = solve_modes(DOME, SILICA, 1)
     with pytest.raises(ShellError, match="from 2 up"):
         amplitude_shift(mode)

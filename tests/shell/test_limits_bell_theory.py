@@ -23,10 +23,9 @@ from shell.errors import ShellError
 from shell.meridian import bell, hemisphere
 from shell.modes import solve_modes
 from shell.rayleigh import rayleigh_bryan_factor, rayleigh_frequency
+from tests.shell.samples import DOME, SILICA
 
-SILICA = Elastic(E=72.7e9, nu=0.17, rho=2203.0)
 ALLOY = Elastic(E=190e9, nu=0.3, rho=8000.0)
-DOME = hemisphere(radius=15e-3, thickness=0.9e-3)
 BELL_SIZE = {"R": 12.5e-3, "L": 10e-3, "S": 6e-3, "R_b": 15e-3}
 BELL = bell(radius=12.5e-3, thickness=0.8e-3, cylinder_height=10e-3, hyperbola_height=6e-3, mouth_radius=15e-3)
 

@@ -32,6 +32,7 @@ from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator
 from shell.solution import total
 from tests.shell.heat_equation import conduct, lifshitz_roukes
+from tests.shell.samples import DOME, SILICA
 
 METAL = Elastic(190e9, 0.3, 8000.0)
 STEEL = Heat(11e-6, 8000 * 460.0, 20.0)
@@ -47,7 +48,7 @@ def _tube(thickness: float, height: float, radius: float = 10e-3) -> Mode:
 
 @pytest.fixture(scope="module")
 def dome() -> Mode:
-    (mode,) = solve_modes(hemisphere(radius=15e-3, thickness=0.9e-3), Elastic(72.7e9, 0.17, 2203.0))
+    (mode,) = solve_modes(DOME, SILICA)
     return mode
 
 
@@ -99,7 +100,7 @@ def test_heat_equation_of_a_tube_is_that_of_its_wall() -> None:
 
 def test_varying_wall_takes_the_flow_of_its_own_thickness() -> None:
     """A wall of 0.9 mm with a kink of 1e-9 in its profile takes the general path and must give the same."""
-    same = hemisphere(radius=15e-3, thickness=0.9e-3)
+    same = DOME
     varied = hemisphere(radius=15e-3, thickness=[(0.0, 0.9e-3), (1.0, 0.9e-3 * (1 + 1e-9))])
     one, other = (solve_modes(r, METAL)[0].solution for r in (same, varied))
     assert one is not None
@@ -242,8 +243,6 @@ def test_bad_input_is_said(dome: Mode) -> None:
         activated_cause(-1.0, 0.5, 300.0, 0.1, "")
     with pytest.raises(ShellError, match="a share 0"):
         Film(1e-7, 78e9, 0.44, 1e-4, coverage=1.2)
-    (closed,) = solve_modes(
-        hemisphere(radius=15e-3, thickness=0.9e-3), Elastic(72.7e9, 0.17, 2203.0), theory="rayleigh"
-    )
+    (closed,) = solve_modes(DOME, SILICA, theory="rayleigh")
     with pytest.raises(ShellError, match="solid or shell"):
         _vibration(closed)

@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
-from shell.elastic import Elastic
 from shell.electrodes import VACUUM, Electrodes, ring_of_electrodes
 from shell.imperfection import Pair
-from shell.meridian import hemisphere
 from shell.modes import solve_modes
+from tests.shell.samples import DOME, SILICA
 
 
 @pytest.fixture(scope="module")
 def pair():
-    return Pair(solve_modes(hemisphere(15e-3, 0.9e-3), Elastic(72.7e9, 0.17, 2203.0), 2, theory="shell")[0])
+    return Pair(solve_modes(DOME, SILICA, 2, theory="shell")[0])
 
 
 def by_circuits(ring, R):

@@ -9,8 +9,9 @@ from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
+from tests.shell.samples import SILICA
 
-SILICA, GOLD = Elastic(72.7e9, 0.17, 2203.0), Elastic(78e9, 0.42, 19300.0)
+GOLD = Elastic(78e9, 0.42, 19300.0)
 R, H = 15e-3, 0.3e-3
 
 

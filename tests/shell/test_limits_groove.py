@@ -8,8 +8,8 @@ import pytest
 from shell.elastic import Elastic
 from shell.groove import Groove, solve_groove
 from shell.imperfection import Pair
-from shell.meridian import hemisphere
 from shell.modes import solve_modes
+from tests.shell.samples import DOME
 
 SILICA = Elastic(72.6283391332881e9, 0.1663662749173554, 2203.0)
 REFERENCE = Path(__file__).parents[1] / "reference" / "grooves.csv"
@@ -20,7 +20,7 @@ TRIED = [CUTS[k] for k in (1, 3, 6, 7)]
 
 @pytest.fixture(scope="module")
 def pair():
-    return Pair(solve_modes(hemisphere(15e-3, 0.9e-3), SILICA, 2)[0])
+    return Pair(solve_modes(DOME, SILICA, 2)[0])
 
 
 @pytest.mark.parametrize(

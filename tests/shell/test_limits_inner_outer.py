@@ -9,7 +9,6 @@ from shell.curves import Arc, Line
 from shell.damping.faces import Vibration
 from shell.damping.film import Film, film_internal_loss, film_shift
 from shell.damping.gas import GASES, viscous_loss
-from shell.elastic import Elastic
 from shell.electrodes import VACUUM, Electrodes, ring_of_electrodes
 from shell.errors import ShellError
 from shell.groove import Groove, solve_groove
@@ -22,8 +21,8 @@ from shell.scan.alignment import align
 from shell.scan.projection import Projector
 from shell.scan.survey import survey
 from shell.surface import build_surface
+from tests.shell.samples import SILICA
 
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
 R, H, L = 12.5e-3, 1e-3, 5e-3
 UP, DOWN = (meridian([Line((R, a), (R, b))], H) for a, b in ((0.0, L), (0.0, -L)))
 TUBES = pytest.mark.parametrize("tube", [cylinder(R, H, L), UP, DOWN], ids=["cylinder", "up", "down"])

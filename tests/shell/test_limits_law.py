@@ -8,10 +8,9 @@ from shell.errors import ShellError
 from shell.law import build_law
 from shell.material import constant_material
 from shell.materials import find_material
-from shell.meridian import hemisphere
 from shell.modes import solve_modes
+from tests.shell.samples import DOME
 
-DOME = hemisphere(15e-3, 0.9e-3)
 SILICA = find_material("fused-silica")
 LAWS = ("spinner", "gwinc", "drawn-fibre")
 T0 = 293.15

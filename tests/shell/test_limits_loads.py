@@ -5,7 +5,6 @@ from math import pi
 import numpy as np
 import pytest
 
-from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.inertia import weigh
 from shell.loads import Loads
@@ -13,8 +12,7 @@ from shell.meridian import cylinder, hemisphere
 from shell.modes import solve_modes
 from shell.resonator import Resonator, Stem
 from shell.system import ShellGroup
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
+from tests.shell.samples import DOME, SILICA
 
 
 def loads_on(body: Resonator, tolerance: float = 1e-5) -> Loads:
@@ -101,4 +99,4 @@ def test_a_cool_rim_stresses_only_what_it_shrinks_beside() -> None:
     assert away[2] == 1.0
     assert found.shift("lateral") == 0.0
     with pytest.raises(ShellError, match="held against no load"):
-        loads_on(hemisphere(15e-3, 0.9e-3))
+        loads_on(DOME)

@@ -12,10 +12,8 @@ from shell.meridian import bell, cylinder, hemisphere, meridian
 from shell.modes import solve_modes
 from shell.rayleigh import rayleigh_frequency
 from shell.resonator import Resonator, Stem
+from tests.shell.samples import DOME, SILICA, STEMMED
 
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
-DOME = hemisphere(15e-3, 0.9e-3)
-STEMMED = hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3, fillet=0.5e-3))
 THEORIES = ["solid", "shell"]
 
 

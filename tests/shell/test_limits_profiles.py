@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from shell.assembly import build_system
-from shell.elastic import Elastic
 from shell.fitted import fit_profile
 from shell.layout import LEVELS
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.refinement import solve_level
 from shell.resonator import Resonator
+from tests.shell.samples import SILICA
 
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
 R = 15e-3
 
 

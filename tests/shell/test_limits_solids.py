@@ -7,7 +7,6 @@ import pytest
 
 from shell.blocks import Solid, mesh_solid
 from shell.cells import at_gauss_points, tabulate_cells
-from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.layout import LEVELS
 from shell.meridian import hemisphere
@@ -15,8 +14,8 @@ from shell.modes import solve_modes
 from shell.patches import Patch, rings, straight, whole
 from shell.resonator import Resonator, Stem
 from shell.root import lay_root
+from tests.shell.samples import SILICA
 
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
 R = 15e-3
 Spot = tuple[float, float]
 

@@ -4,14 +4,12 @@ from math import pi
 
 import pytest
 
-from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.meridian import cylinder, hemisphere
 from shell.modes import solve_modes
 from shell.resonator import Stem
 from shell.spin import spin_shift
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
+from tests.shell.samples import DOME, SILICA
 
 
 @pytest.mark.parametrize("n", [2, 3])
@@ -35,16 +33,16 @@ def test_a_ring_that_bends_out_of_its_plane_is_a_string(n: int) -> None:
 
 def test_a_dome_on_its_stem_feels_spin_as_a_free_one_does() -> None:
     """A thin stem holds neither the stress at the rim nor the mode."""
-    free, held = hemisphere(15e-3, 0.9e-3), hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(1e-3, -5e-3, 0.2e-3))
+    free, held = DOME, hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(1e-3, -5e-3, 0.2e-3))
     one, other = (spin_shift(solve_modes(body, SILICA)[0], SILICA).total for body in (free, held))
     assert one == pytest.approx(other, rel=5e-3)
     assert 0 < one * (2 * pi * 4596) ** 2 < 2
 
 
 def test_modes_that_have_no_such_number_are_refused() -> None:
-    (mode,) = solve_modes(hemisphere(15e-3, 0.9e-3), SILICA, theory="shell")
+    (mode,) = solve_modes(DOME, SILICA, theory="shell")
     with pytest.raises(ShellError, match="solid theory"):
         spin_shift(mode, SILICA)
-    (mode,) = solve_modes(hemisphere(15e-3, 0.9e-3), SILICA, 1)
+    (mode,) = solve_modes(DOME, SILICA, 1)
     with pytest.raises(ShellError, match="from 2 up"):
         spin_shift(mode, SILICA)

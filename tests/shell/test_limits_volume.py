@@ -7,26 +7,14 @@ from math import pi
 import numpy as np
 import pytest
 
-from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.inertia import weigh
-from shell.meridian import bell, cylinder, hemisphere
+from shell.meridian import hemisphere
 from shell.modes import solve_modes
-from shell.resonator import Stem
 from shell.volume import build_volume, encode_volume
+from tests.shell.samples import BODIES, SILICA, H, R
 
-R, H = 15e-3, 0.9e-3
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
-SHAPES = {
-    "dome": hemisphere(R, H),
-    "open pole": hemisphere(R, H, pole_angle=0.3),
-    "clamped rim": hemisphere(R, H, support="clamped-rim"),
-    "closed sphere": hemisphere(R, H, rim_angle=pi),
-    "inner stem": hemisphere(R, H, support="stem", stem=Stem(2.5e-3, -5e-3, 0.5e-3)),
-    "two stems, sharp": hemisphere(R, H, support="stem", stem=Stem(2.5e-3, (-5e-3, 25e-3), 0.0, "both")),
-    "cup": cylinder(12.5e-3, 0.7e-3, 18e-3, bottom_thickness=2e-3, clamp_radius=4e-3),
-    "bell": bell(12.5e-3, 0.8e-3, 10e-3, 6e-3, 15e-3),
-}
+SHAPES = BODIES | {"clamped rim": hemisphere(R, H, support="clamped-rim")}
 CELLS = {25: "QuadraticHexahedron", 29: "TriQuadraticHexahedron", 26: "QuadraticWedge", 32: "BiQuadraticQuadraticWedge"}
 
 

@@ -8,18 +8,16 @@ from shell.damping.budget import bulk_cause, loss_budget, surface_cause
 from shell.damping.faces import Vibration
 from shell.damping.gas import GASES, R, free_molecular_loss
 from shell.damping.thermoelastic import trace_share
-from shell.elastic import Elastic
 from shell.materials import find_material
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
+from tests.shell.samples import DOME, SILICA
 
 
 @pytest.mark.parametrize(("n", "share"), [(2, 0.2259), (3, 0.388), (4, 0.530)])
 def test_trace_share_of_the_free_dome(n: int, share: float) -> None:
     """Notes on imperfection, loss and loops, section 3: P at h/R = 0.06, ν = 0.17."""
-    (mode,) = solve_modes(hemisphere(radius=15e-3, thickness=0.9e-3), SILICA, n)
+    (mode,) = solve_modes(DOME, SILICA, n)
     assert trace_share(mode.solution) == pytest.approx(share, abs=1e-3 * share)
 
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import eigh
 
 from shell.curves import Line
-from shell.elastic import Elastic, find_constants
+from shell.elastic import find_constants
 from shell.electrodes import VACUUM, Electrode, Electrodes, along, reach, ring_of_electrodes, trim_voltages
 from shell.errors import ShellError
 from shell.imperfection import Pair, wave
@@ -17,8 +17,8 @@ from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.resonator import Resonator
 from shell.sparse import assemble_elements
+from tests.shell.samples import SILICA
 
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
 R, H = 15e-3, 0.8558e-3
 
 

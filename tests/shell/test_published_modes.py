@@ -12,9 +12,9 @@ from shell.elastic import Elastic
 from shell.meridian import cylinder, hemisphere
 from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator, Stem
+from tests.shell.samples import SILICA
 
 REFERENCE = Path(__file__).parents[1] / "reference"
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
 STEEL = Elastic(190e9, 0.3, 8000.0)
 UNIT = Elastic(1.0, 0.3, 1.0)
 

@@ -5,10 +5,9 @@ from math import pi
 import numpy as np
 import pytest
 
-from shell.elastic import Elastic
 from shell.groove import Groove, solve_groove
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, find_split, wave
-from shell.meridian import cylinder, hemisphere
+from shell.meridian import cylinder
 from shell.modes import solve_modes
 from shell.scan.alignment import align
 from shell.scan.projection import Projector
@@ -16,11 +15,8 @@ from shell.scan.survey import rigid_shapes, survey
 from shell.trimming import SplitWave, plan_trim
 from studies.resonator.scan import polar_intervals
 from studies.resonator.trim import Teeth, Tool, plan_for_card, rim_sites, tooth_sites
+from tests.shell.samples import DOME, SILICA, H, R
 from tests.shell.scans import dome_points
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
-R, H = 15e-3, 0.9e-3
-DOME = hemisphere(radius=R, thickness=H)
 
 
 @pytest.fixture(scope="module")

@@ -254,6 +254,10 @@ def test_outputs_that_stand_still_are_told(record, name, value):
 CAMPAIGN = ("ramp 25 -15 1 then soak -15 2h", "ramp -15 40 1 then soak 40 2h", "cycle 20 -5 45 0.5 30min 1")
 
 
+def put(runs, k, change):
+    return [change(run) if j == k else run for j, run in enumerate(runs)]
+
+
 def campaign_of(card):
     made = [simulate_run(card, load_profile(one), 1 / 60, seed).record for seed, one in enumerate(CAMPAIGN)]
     return [dataclasses.replace(run, path=f"run{k}.csv") for k, run in enumerate(made)]
@@ -269,9 +273,7 @@ def runs(card):
 def with_another():
     """The same of a gyro that is near to one lag, one run of them of another gyro, 0.07 % away."""
     made = campaign_of(load_card("cvg-25mm"))
-    return lambda k: [
-        spoilt(run, frequency_Hz=lambda f: (1 + 7e-4) * f) if j == k else run for j, run in enumerate(made)
-    ]
+    return lambda k: put(made, k, lambda run: spoilt(run, frequency_Hz=lambda f: (1 + 7e-4) * f))
 
 
 @pytest.mark.parametrize(
@@ -300,7 +302,7 @@ def with_another():
 def test_one_run_read_otherwise_than_the_others_is_named(runs, work, read, said, k):
     """A diagnosis named a second lag, a hysteresis or an ageing; a fit left the run out unsaid."""
     with pytest.raises(InputError, match=f"run{k}.csv: .*{said}"):
-        work([read(run) if j == k else run for j, run in enumerate(runs)])
+        work(put(runs, k, read))
 
 
 @pytest.mark.parametrize("k", [None, 0, 2])
@@ -435,3 +437,84 @@ def test_a_file_of_two_runs_is_to_be_split(tmp_path):
     (tmp_path / "jump.csv").write_text("time_s,chamber_temperature_degC\n0,20\n60,20\n60,10\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"jump\.csv, line 4: time_s does not increase, it is there twice: for a jump"):
         load_profile(str(tmp_path / "jump.csv"))
+
+
+@pytest.fixture(scope="module")
+def four(card, runs):
+    """Those three and a run that begins with a step."""
+    made = simulate_run(card, load_profile("step 30 5 3h"), 1 / 60, 3).record
+    return [*runs, dataclasses.replace(made, path="run3.csv")]
+
+
+def said_of(runs):
+    said = []
+    return records_of_one_gyro(runs, said.append), said
+
+
+def test_runs_of_one_gyro_raise_no_doubt(four):
+    kept, said = said_of(four)
+    assert said == []
+    assert all(one is own for one, own in zip(kept, four, strict=True))
+
+
+@pytest.mark.parametrize(("k", "apart"), [(0, -2.8), (2, -17.0), (3, 5.0)])
+def test_a_run_of_another_gyro_is_named_behind_any_heat_path(four, k, apart):
+    """One lag left more than these differ by: a diagnosis named a second lag, radiation and a mounting stress of 10 days."""
+    _, said = said_of(put(four, k, lambda run: run.with_columns({"frequency_Hz": run["frequency_Hz"] + apart})))
+    (sentence,) = said
+    assert sentence.startswith(f"run{k}.csv: frequency_Hz is ")
+    assert float(sentence.split(" is ")[1].split(" Hz")[0]) == pytest.approx(apart, rel=0.15)
+
+
+@pytest.mark.parametrize("apart", [0.1, 0.5])
+def test_a_jump_or_an_ageing_is_no_other_gyro(four, apart):
+    _, said = said_of(put(four, 1, lambda run: run.with_columns({"frequency_Hz": run["frequency_Hz"] + apart})))
+    assert said == []
+
+
+def late(run, hours):
+    """The same run, its temperatures logged by a clock that is so many hours behind."""
+    time = run["time_s"]
+    rows = (time - 3600.0 * hours >= time[0]) & (time - 3600.0 * hours <= time[-1])
+    moved = {name: np.interp(time[rows] - 3600.0 * hours, time, run[name]) for name in TEMPERATURES}
+    columns = {name: column[rows] for name, column in run.columns.items()} | moved
+    return dataclasses.replace(run, columns=columns | {"time_s": columns["time_s"] - columns["time_s"][0]})
+
+
+@pytest.mark.parametrize(("k", "hours", "said"), [(1, 1, "1 h behind"), (2, -1, "1 h ahead of")])
+def test_temperatures_of_a_clock_an_hour_off_are_named(four, k, hours, said):
+    """Such a run was a second lag and radiation, with a noise of 0.8 Hz."""
+    with pytest.raises(
+        InputError, match=rf"run{k}\.csv: housing_temperature_degC is {said} frequency_Hz: moved so, one law holds"
+    ):
+        said_of(put(four, k, lambda run: late(run, hours)))
+
+
+@pytest.mark.parametrize("name", ["frequency_Hz", "bias_deg_per_h", TEMPERATURES[0]])
+def test_a_column_that_is_stuck_to_the_end_is_left_out(four, name):
+    """Only readings on both sides told; a housing so stuck was called exchanged with its chamber."""
+
+    def stick(run):
+        own = run[name].copy()
+        own[-100:] = own[-100]
+        return run.with_columns({name: own})
+
+    kept, said = said_of(put(four, 2, stick))
+    assert [sentence.split(", the first")[0] for sentence in said] == [
+        f"run2.csv: {name} repeats one reading in 100 rows"
+    ]
+    last = list(range(len(kept[2]) - 100, len(kept[2])))
+    without = {
+        name,
+        *(("frequency_Hz", "bias_deg_per_h", "inverse_q") if name == TEMPERATURES[0] else ()),
+    }  # nothing drives them there
+    for column, own in kept[2].columns.items():
+        assert np.flatnonzero(np.isnan(own)).tolist() == (last if column in without else [])
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(0.5, r"\(by 2: "), (1e-3, r"\(by 1000: one is in kHz\)"), (1.1, r"so much\. The")]
+)
+def test_the_odd_frequency_of_several_comes_first_and_its_factor_is_told(four, factor, said):
+    with pytest.raises(InputError, match=rf"^run2\.csv: frequency_Hz is about .*{said}"):
+        said_of(put(four, 2, lambda run: run.with_columns({"frequency_Hz": factor * run["frequency_Hz"]})))

@@ -68,6 +68,13 @@ def test_compensation_takes_the_curve_out_and_refuses_to_extrapolate(model):
         compensate(model, compensate(model, record))
 
 
+def words_of(folder, model, columns):
+    """What compensates a record of these columns by a model, both written to the folder."""
+    write_model(model, folder / "m.toml")
+    write_record(Record(columns), folder / "run.csv")
+    return ["compensate", str(folder / "m.toml"), str(folder / "run.csv"), "--out", str(folder / "out.csv")]
+
+
 def test_a_frequency_model_needs_no_housing_sensor(model, tmp_path, ask):
     true = np.array([-10.0, 5.0, 25.0])
     columns = {"time_s": np.arange(3.0), "frequency_Hz": evaluate(model, true) + 0.5}
@@ -76,9 +83,7 @@ def test_a_frequency_model_needs_no_housing_sensor(model, tmp_path, ask):
         out = compensate(model, Record(columns | {name: true}))
         assert out["compensated_frequency_Hz"] == pytest.approx(f0 + 0.5, abs=1e-9)
     # Without any thermometer the frequency is its own: its temperature is all that the model can say.
-    write_model(model, tmp_path / "m.toml")
-    write_record(Record(columns | {"frequency_Hz": evaluate(model, true)}), tmp_path / "run.csv")
-    words = ["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "out.csv")]
+    words = words_of(tmp_path, model, columns | {"frequency_Hz": evaluate(model, true)})
     assert ask(words)["added"] == ["resonator_temperature_degC"]
     out = read_record(tmp_path / "out.csv")
     assert out["resonator_temperature_degC"] == pytest.approx(true, abs=1e-6)
@@ -88,9 +93,7 @@ def test_a_frequency_model_needs_no_housing_sensor(model, tmp_path, ask):
 def test_a_record_too_short_for_its_stability_is_compensated_all_the_same(model, tmp_path, capsys, ask):
     housing = np.array([-10.0, 5.0, 25.0])
     columns = {"time_s": np.arange(3.0), "housing_temperature_degC": housing, "frequency_Hz": evaluate(model, housing)}
-    write_model(model, tmp_path / "m.toml")
-    write_record(Record(columns), tmp_path / "run.csv")
-    words = ["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "out.csv")]
+    words = words_of(tmp_path, model, columns)
     assert main(words) == 0
     assert "too few rows" in capsys.readouterr().out
     assert ask(words)["columns"]["compensated_frequency_Hz"]["stability_after"] is None
@@ -102,9 +105,7 @@ def test_a_short_record_is_judged_by_averages_of_a_tenth_of_it(model, tmp_path, 
     time = np.arange(101.0)
     housing = 10.0 + 0.1 * time
     columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": evaluate(model, housing)}
-    write_model(model, tmp_path / "m.toml")
-    write_record(Record(columns), tmp_path / "run.csv")
-    words = ["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "out.csv")]
+    words = words_of(tmp_path, model, columns)
     column = ask(words)["columns"]["compensated_frequency_Hz"]
     means = columns["frequency_Hz"][:100].reshape(10, 10).mean(1)
     assert column["averaging_s"] == 10.0
@@ -122,9 +123,7 @@ def test_a_measured_rate_is_judged_by_its_error(tmp_path, ask):
     part = make_part("bias", ("constant", "f"), (0.0, 0.05), ("deg/s", "deg/s/Hz"))
     ranges = {"frequency_Hz": (3990.0, 4010.0), "frequency_rate_Hz_per_s": (-1.0, 1.0)}
     model = Model(kind="bias", compensates="measured_rate_deg_per_s", settings=settings, parts=(part,), validity=ranges)
-    write_model(model, tmp_path / "m.toml")
-    write_record(Record(columns), tmp_path / "run.csv")
-    words = ["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "out.csv")]
+    words = words_of(tmp_path, model, columns)
     found = ask(words)["columns"]["compensated_measured_rate_deg_per_s"]
     assert found["stability_before"] == pytest.approx(0.1 / np.sqrt(2), rel=0.01)
     assert found["stability_after"] < 1e-3 * found["stability_before"]
@@ -238,11 +237,7 @@ def test_a_frequency_that_lags_its_thermometer_is_told_as_such(model, tmp_path, 
     housing = 10 + 25 * np.sin(time / 1500)
     late = lag(time, housing, 3000.0)
     columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": evaluate(model, late)}
-    write_model(model, tmp_path / "m.toml")
-    write_record(Record(columns), tmp_path / "run.csv")
-    assert (
-        main(["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "o.csv")]) == 0
-    )
+    assert main(words_of(tmp_path, model, columns)) == 0
     said = capsys.readouterr().err
     assert "compensated_frequency_Hz is worse than the record" in said
     assert "the resonator lags its thermometer" in said

@@ -33,12 +33,12 @@ from tests.compiled import compile_c
 STRIDE = 20
 
 
-def write(path, run, missing=(), stride=STRIDE):
+def write(path, run, missing=(), stride=STRIDE, step=0.1):
     """Every twentieth row of a run as a record of 10 Hz; the rows in `missing` lose their output."""
     lines = ["time_s,housing_temperature_degC,output_counts,rate_deg_per_s"]
     for i, row in enumerate(range(0, len(run.time), stride)):
         output = "" if i in missing else f"{run.output[row]:.6f}"
-        lines.append(f"{0.1 * i:.1f},{run.temperature[row]:.6f},{output},{run.rate[row]:.9g}")
+        lines.append(f"{step * i:.3f},{run.temperature[row]:.6f},{output},{run.rate[row]:.9g}")
     path.write_text("\n".join(lines) + "\n")
     return str(path)
 
@@ -174,16 +174,8 @@ def test_the_records_of_the_fit_are_compensated(tmp_path, capsys):
     """At 100 Hz a fit is of block averages: neither their narrower range nor an outlier refuses the rows they are made of."""
     records, model = [], tmp_path / "model.toml"
     for name, run in zip(("rates", "rest", "turning"), simulate_runs(np.random.default_rng(2)), strict=True):
-        rows = slice(0, None, 2)
-        output = run.output[rows].copy()
-        output[777] += 1e6
-        lines = [
-            f"{t:.3f},{T:.6f},{counts:.6f},{rate:.9g}"
-            for t, T, counts, rate in zip(run.time[rows], run.temperature[rows], output, run.rate[rows], strict=True)
-        ]
-        records.append(str(tmp_path / f"{name}.csv"))
-        header = "time_s,housing_temperature_degC,output_counts,rate_deg_per_s"
-        Path(records[-1]).write_text("\n".join([header, *lines]) + "\n")
+        run.output[1554] += 1e6
+        records.append(write(tmp_path / f"{name}.csv", run, stride=2, step=run.time[2]))
     assert main(["fit", "scale", *records, "--save", str(model)]) == 0
     for record in records:
         assert main(["compensate", str(model), record, "--out", str(tmp_path / "out.csv")]) == 0, (
@@ -361,11 +353,9 @@ def test_rough_calibration_of_the_paper_is_taken(records, tmp_path, capsys):
     """Five minutes of rest, then +100 °/s (eq. 33): null = mean at rest, scale = 100 °/s over the difference of the means."""
     generator = np.random.default_rng(9)
     output = np.where(np.arange(6000) < 3000, -690.0, 3500.0) + generator.normal(0, 3.0, 6000)
-    lines = ["time_s,housing_temperature_degC,output_counts,rate_deg_per_s"]
-    lines += [f"{0.1 * i:.1f},25.0,{output[i]:.6f},{0 if i < 3000 else 100}" for i in range(6000)]
-    rough = tmp_path / "rough.csv"
-    rough.write_text("\n".join(lines) + "\n")
-    assert main(["fit", "scale", str(rough), *records, "--json"]) == 0
+    time, rate = 0.1 * np.arange(6000), np.repeat([0.0, 100.0], 3000)
+    rough = write(tmp_path / "rough.csv", BellRun(time, output, np.full(6000, 25.0), rate), stride=1)
+    assert main(["fit", "scale", rough, *records, "--json"]) == 0
     said = capsys.readouterr()
     found = json.loads(said.out)["parts"]["rough"]
     step = output[3000:].mean() - output[:3000].mean()

@@ -2,18 +2,16 @@
 
 import pytest
 
-from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, find_split, wave
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.resonator import Stem
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
+from tests.shell.samples import DOME, SILICA
 
 
 def test_n_0_does_not_split_and_rayleigh_has_no_energies():
-    dome = hemisphere(radius=15e-3, thickness=0.9e-3)
+    dome = DOME
     (breathing,) = solve_modes(dome, SILICA, 0)
     with pytest.raises(ShellError, match="n = 0"):
         Pair(breathing)

@@ -5,15 +5,11 @@ from math import pi
 import numpy as np
 import pytest
 
-from shell.elastic import Elastic
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, find_split, wave
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.resonator import Stem
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
-R, H = 15e-3, 0.9e-3
-DOME = hemisphere(radius=R, thickness=H)
+from tests.shell.samples import DOME, SILICA, H, R
 
 
 @pytest.fixture(scope="module")

@@ -4,14 +4,11 @@ from math import log
 
 import pytest
 
-from shell.elastic import Elastic
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, find_split, wave
 from shell.inertia import weigh
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
-
-SILICA = Elastic(72.7e9, 0.17, 2203.0)
-R, H = 15e-3, 0.9e-3
+from tests.shell.samples import SILICA, H, R
 
 
 @pytest.fixture(scope="module")

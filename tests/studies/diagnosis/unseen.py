@@ -24,8 +24,6 @@ RATE = 1 / 60
 GAP = 86400.0
 RESPONSES = F, B, Q = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
 TIMES = 20.0
-LARGER = {"cross-damping": 40.0}
-"""The same of what shows at the ends of the range, where the unseen profile hardly is."""
 DEVIATIONS = 1.96
 """An error is within so many of its standard deviations in 95 of 100 draws of the noise; of several independent ones, in more."""
 CARD_SAYS = {
@@ -36,27 +34,14 @@ CARD_SAYS = {
 }
 """The bias follows the temperature, without a second cause; offsets of turn-on of a tenth of the noise, beside which a drift of the bias
 from run to run is told."""
-COMMANDED = {
-    "amplitude_squared": (1.0, 1.2, 0.8, 1.1),
-    "voltage_squared": (80.0, 100.0, 60.0, 90.0),
-    "quadrature": (0.5, 1.5, -0.5, 1.0),
-    "pattern_angle": (0.0, 15.0, 30.0, 40.0),
-}
+COMMANDED = {"amplitude_squared": (1.0, 1.2, 0.8, 1.1)}
 """Levels of a commanded drive, in the unit of its column."""
-CROSS = {"axis_deg": -90.0, "quartic_deg_per_h_per_10K4": 1.0, "quintic_deg_per_h_per_10K5": 0.3}
-PACKS = (
-    (
-        ("hysteresis", F, {"half_width_K": 4.0, "loop_Hz_per_K": 1.0}),
-        ("ageing", B, {"onset_s": 9000.0, "drift_deg_per_h": 1.0}),
-        ("jump", Q, {"run": 0.0, "time_s": 9000.0, "step_1": 1.0}),
-    ),
-    (
-        ("self-heating", F, {"heating_K_per_V2": 1.0}),
-        ("cross-damping", B, {"from_degC": -15.0, "to_degC": 40.0, **CROSS}),
-        ("leak", Q, {"temperature_exponent": 0.5, "growth_1_per_day": 1.0}),
-    ),
+CASES = (
+    ("self-heating", F, {"heating_K_per_V2": 1.0}),
+    ("ageing", B, {"onset_s": 9000.0, "drift_deg_per_h": 1.0}),
+    ("jump", Q, {"run": 0.0, "time_s": 9000.0, "step_1": 1.0}),
 )
-"""Effects that do not disturb each other, with their shapes: of memory and of a moment, of commanded drives and of days."""
+"""Effects that do not disturb each other, with their shapes: of a commanded drive through the heat path, of days, of a moment."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +101,7 @@ def recover(cases):
             one = card.with_table("effect", [table(size)])
             runs = [0] if effect.once else [0, 1]
             added = rms([simulate(one, k)[response] - bare[k][response] for k in runs])
-            size *= LARGER.get(effect.name, TIMES) * noise[response] / added
+            size *= TIMES * noise[response] / added
         return table(size)
 
     tables = [sized(effect, response, shape) for effect, (_, response, shape) in zip(effects, cases, strict=True)]

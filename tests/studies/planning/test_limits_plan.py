@@ -135,6 +135,7 @@ def test_equivalents_stand_in_a_set_and_drives_that_stand_still_cannot_show():
 
 def test_a_plan_beyond_the_chamber_is_refused():
     chamber = parse_chamber("rate 3 range -40 85")
+    assert (chamber.rate, chamber.low, chamber.high) == (3.0, -40.0, 85.0)
     require_reach(chamber, "ramp 20 -10 3")
     with pytest.raises(InputError, match="reaches -40 to 85"):
         require_reach(chamber, "soak -60 5h")
@@ -149,9 +150,12 @@ def test_a_card_without_noise_plans_nothing():
 
 
 @pytest.mark.parametrize(
-    "words", ["step 20 -10 5h", "soak 20 1h then soak -35 5400s", "step 20 -10 5h then ramp -10 40 9"]
-)
-def test_words_of_every_form_keep_to_the_chamber(words):
+    ("words", "minutes"),
+    [("step 20 -10 5h", 300), ("soak 20 1h then soak -35 5400s", 150), ("step 20 -10 5h then ramp -10 40 9", 317),
+     ("soak -20 60min then soak 40 60min then staircase 40 0 20 30min", 210)],
+)  # fmt: skip
+def test_words_of_every_form_keep_to_the_chamber(words, minutes):
     profile = parse_profile(limited(words, 3.0))
+    assert profile.end == pytest.approx(60.0 * minutes, rel=0.02)
     assert (np.abs(np.diff(profile.value)) <= 3.001 / 60.0 * np.diff(profile.time)).all()
     assert (profile.value[0], profile.value[-1]) == (parse_profile(words).value[0], parse_profile(words).value[-1])

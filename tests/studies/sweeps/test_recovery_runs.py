@@ -25,7 +25,7 @@ from studies.sweeps.opening import claim_store
 from studies.sweeps.results import open_results
 from studies.sweeps.run import run_study
 from studies.sweeps.workers import Pool
-from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
+from tests.studies.sweeps.processes import environment, rows_of, spec_of
 
 X = 'name = "user.x"\nlow = 0.0\nhigh = 1.0'
 PLAIN = """schema = "hrg.study/1"
@@ -284,36 +284,6 @@ def test_a_torn_store_holds_what_was_whole(tmp_path, functions, capsys, ask):
     path.write_bytes(b"")
     with pytest.raises(InputError, match="or the file was truncated"):
         open_results(tmp_path / "out").study  # noqa: B018
-
-
-@pytest.mark.slow
-def test_full_disk_keeps_what_was_written_and_says_so(tmp_path, functions, hrg):
-    spec = written(tmp_path, "square", 'method = "grid"\nbatch = 20', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 600')
-    words = words_of("study", "run", str(spec), "--out", str(tmp_path / "out"), "--workers", "1", "--allow-python")
-    limit = "import resource, os, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (12_000, 12_000)); os.execv(sys.argv[1], sys.argv[1:])"
-    command = [sys.executable, "-c", limit, *words]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment(), timeout=600, check=False)
-    assert done.returncode == 3, done.stderr
-    assert "run the same command again" in done.stderr
-    assert "Traceback" not in done.stderr
-    kept = len(rows_of(tmp_path / "out"))
-    assert 0 < kept < 600
-    assert hrg(*words[3:]).returncode == 0
-    assert len(rows_of(tmp_path / "out")) == 600
-
-
-def test_folder_that_cannot_be_made_and_folder_without_study(tmp_path, functions, hrg):
-    spec = written(tmp_path, "square", 'method = "grid"', 'name = "user.x"\nvalues = [1]')
-    (tmp_path / "file").write_text("")
-    done = hrg("study", "run", spec, "--out", tmp_path / "file" / "out", "--allow-python")
-    assert done.returncode == 2
-    assert "there is no folder" in done.stderr
-    done = hrg("study", "status", tmp_path)
-    assert done.returncode == 2
-    assert "no study" in done.stderr
-    done = hrg("study", "run", spec, "--allow-python")
-    assert done.returncode == 2
-    assert "--out" in done.stderr
 
 
 @pytest.mark.slow
