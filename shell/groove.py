@@ -22,7 +22,7 @@ from shell.cross_section import cut
 from shell.elastic import COSINE
 from shell.errors import ShellError, mm
 from shell.imperfection import Pair
-from shell.kernel import TENSOR
+from shell.kernel import TENSOR, energy_weights
 from shell.quadrature import Array, at_gauss, gauss, nodal
 from shell.resonator import Resonator
 from shell.sparse import Index, assemble_elements, dissect, factor_symmetric
@@ -160,31 +160,18 @@ class _Nodes:
     """Nodes and elements of a grid, in Cartesian components."""
 
     def __init__(self, resonator: Resonator, grid: _Grid) -> None:
-        self.resonator, self.grid = resonator, grid
         knots = [np.interp(np.arange(2 * len(x) - 1) / 2, np.arange(len(x)), x) for x in (grid.s, grid.theta, grid.eta)]
         shape = tuple(len(x) for x in knots)
         self.shape, number = shape, np.arange(np.prod(shape)).reshape(shape)
-        cells = [len(x) - 1 for x in (grid.s, grid.theta, grid.eta)]
-        i, j, k = np.meshgrid(*(np.arange(n) for n in cells), indexing="ij")
-        a, b, c = np.meshgrid(*3 * [np.arange(3)], indexing="ij")
-        self.elements = number[
-            (2 * i.ravel()[:, None] + a.ravel()),
-            (2 * j.ravel()[:, None] + b.ravel()),
-            (2 * k.ravel()[:, None] + c.ravel()),
-        ]
+        self.elements = np.lib.stride_tricks.sliding_window_view(number, (3, 3, 3))[::2, ::2, ::2].reshape(-1, 27)
         self.gone = grid.gone.ravel()
-        place = resonator.at(knots[0])
-        rho, z = place.at_heights(knots[2])
+        rho, z = (np.broadcast_to(one[:, None], shape) for one in resonator.at(knots[0]).at_heights(knots[2]))
         theta = knots[1][None, :, None]
-        x = np.broadcast_to(rho[:, None], shape) * np.cos(theta), np.broadcast_to(rho[:, None], shape) * np.sin(theta)
-        self.points = np.stack([*x, np.broadcast_to(z[:, None], shape)], axis=-1).reshape(-1, 3)
-        used = np.zeros(number.size, dtype=bool)
+        self.points = np.stack([rho * np.cos(theta), rho * np.sin(theta), z], axis=-1).reshape(-1, 3)
+        used, held = np.zeros(number.size, dtype=bool), np.zeros(shape, dtype=bool)
         used[self.elements[~self.gone].ravel()] = True
-        held = np.zeros(shape, dtype=bool)
-        held[0] = True
-        if not grid.is_rim:
-            held[-1] = True
-        self.used, self.held = used, held.ravel()
+        held[0], held[-1] = True, not grid.is_rim
+        self.moving = used & ~held.ravel()
         ends = np.zeros((2, *shape), dtype=bool)
         ends[0, :, 0] = ends[1, :, -1] = True
         self.ends = ends.reshape(2, -1)
@@ -192,7 +179,7 @@ class _Nodes:
 
     def free(self, kind: int) -> Index:
         """Unknowns, three a node along the radius, circle and axis, of cos nθ (0) or sin nθ (1), between its mirror planes, dissected."""
-        free = np.repeat((self.used & ~self.held)[:, None], 3, axis=1)
+        free = np.repeat(self.moving[:, None], 3, axis=1)
         even, odd = self.ends[::-1] if kind else self.ends
         free[even, 1] = False
         free[np.ix_(odd, [0, 2])] = False
@@ -240,58 +227,46 @@ def _loads(
 
     The modes leave a traction of 1e-3 of the stress on a face that is free: it is taken off, or a wide, shallow cut would seem to be pulled.
     """
-    n, eigenvalue = pair.mode.harmonic, pair.solution.eigenvalue
+    resonator, solution, n = pair.resonator, pair.solution, pair.mode.harmonic
     values, x = at_gauss(nodal, 2, 3).values, gauss(3)[0]
-    functions = np.einsum("ai,bj,ck->abcijk", values, values, values).reshape(27, 27)
+    functions = np.einsum("ai,bj,ck->abcijk", values, values, values).reshape(3, 3, 3, 27)
     gone = np.flatnonzero(nodes.gone)
     slopes, volume = nodes.slopes(gone)
-    i, j, k = np.unravel_index(gone, grid.gone.shape)
-    loads = np.zeros((2, 3 * len(nodes.points)))
+    slopes, weight = slopes.reshape(-1, 3, 3, 3, 3, 27), volume.reshape(-1, 3, 3, 3)  # elements, points along s, θ, η
 
     def points(knots: Array, cell: Index) -> Array:
         return np.asarray((knots[cell, None] * (1 - x) + knots[cell + 1, None] * (1 + x)) / 2)
 
-    eta, theta = points(grid.eta, k), points(grid.theta, j)
-    heights, back = np.unique(eta, return_inverse=True)
+    s, theta, eta = map(points, (grid.s, grid.theta, grid.eta), np.unravel_index(gone, grid.gone.shape))
+    stations, at_s = np.unique(s, return_inverse=True)
+    heights, at_eta = np.unique(eta, return_inverse=True)
     if face != "edge":
-        heights = np.append(heights, pair.resonator.height_of(face))  # the free face, last
-    layers = np.zeros(2)
-    for row in np.unique(i):
-        for station, s in enumerate(points(grid.s, np.array([row]))[0]):
-            here = cut(pair.resonator, pair.solution.system, min(s / pair.resonator.length, 1.0), heights)
-            e, d = here.strains(pair.solution.unknowns), here.displacements(pair.solution.unknowns)
-            stress = G * np.array([2, 2, 2, 1, 1, 1])[:, None] * e
-            stress[:3] += lam * e[:3].sum(axis=0)
-            if face != "edge":
-                stress[NORMAL] -= stress[NORMAL, -1:]
-            place = pair.resonator.at([s])
-            t, normal = (place.tangent_r[0], place.tangent_z[0]), (place.normal_r[0], place.normal_z[0])
-            mine = np.flatnonzero(i == row)
-            at = back.reshape(eta.shape)[mine]  # elements, 3
-            angle = theta[mine]
-            cosine, sine = np.cos(n * angle)[:, :, None], np.sin(n * angle)[:, :, None]
-            Q = np.empty((len(mine), 3, 1, 3, 3))  # rows: axes s, θ, ζ in x, y, z
-            ct, st = np.cos(angle)[..., None], np.sin(angle)[..., None]
-            zero = np.zeros_like(ct)
-            for axis, vector in enumerate((
-                (t[0] * ct, t[0] * st, t[1] + zero), (-st, ct, zero), (normal[0] * ct, normal[0] * st, normal[1] + zero),
-            )):  # fmt: skip
-                Q[..., axis, :] = np.stack(vector, axis=-1)
-            chosen = slice(9 * station, 9 * station + 9)
-            weight = volume[mine, chosen].reshape(-1, 3, 3)
-            N, slope = functions[chosen].reshape(3, 3, 27), slopes[mine, chosen].reshape(-1, 3, 3, 3, 27)
-            for kind, (even, odd) in enumerate(((cosine, sine), (sine, -cosine))):
-                factor = np.where(np.isin(np.arange(6), COSINE), even[..., None], odd[..., None])
-                local = np.moveaxis(stress[:, at], 0, -1)[:, None] * factor
-                moved = np.moveaxis(d[:, at], 0, -1)[:, None] * np.where(
-                    [True, False, True], even[..., None], odd[..., None]
-                )
-                energy = np.moveaxis((stress * e)[:, at], 0, -1)[:, None] * factor**2
-                dense = energy.sum(axis=-1) - eigenvalue * rho * (moved**2).sum(axis=-1)
-                layers[kind] += 2 * float(np.sum(dense * weight))
-                turned = np.swapaxes(Q, -1, -2) @ local[..., TENSOR] @ Q
-                force = eigenvalue * rho * (moved[..., None, :] @ Q)[..., 0, :]
-                push = np.einsum("etzij,etzjf,etz->efi", turned, slope, weight)
-                push -= np.einsum("etzi,tzf,etz->efi", force, N, weight)
-                np.add.at(loads[kind], 3 * nodes.elements[gone[mine]][:, :, None] + np.arange(3), push)
+        heights = np.append(heights, resonator.height_of(face))  # the free face, last
+    cuts = [cut(resonator, solution.system, min(one / resonator.length, 1.0), heights) for one in stations]
+    e, d = (np.array([getattr(one, name)(solution.unknowns) for one in cuts]) for name in ("strains", "displacements"))
+    stress = G * energy_weights()[:, None] * e
+    stress[:, :3] += lam * e[:, :3].sum(axis=1, keepdims=True)
+    if face != "edge":
+        stress[:, NORMAL] -= stress[:, NORMAL, -1:]
+    at = at_s.reshape(-1, 3, 1, 1), at_eta.reshape(-1, 1, 1, 3)
+    stress, e, d = (np.moveaxis(field, 1, -1)[at] for field in (stress, e, d))
+    place, zero, one = resonator.at(stations), np.zeros(len(stations)), np.ones(len(stations))
+    t_r, t_z, cosine, sine, none = place.tangent_r, place.tangent_z, np.cos(theta), np.sin(theta), np.zeros(theta.shape)
+    section = np.moveaxis(
+        np.array([[t_r, zero, t_z], [zero, one, zero], [-t_z, zero, t_r]]), 2, 0
+    )  # s, θ, ζ in r, θ, z
+    around = np.array([[cosine, sine, none], [-sine, cosine, none], [none, none, none + 1]])  # these in x, y, z
+    Q = section[at[0]] @ np.moveaxis(around, (2, 3), (0, 1))[:, None, :, None]
+    loads, layers = np.zeros((2, 3 * len(nodes.points))), np.zeros(2)
+    c, s = (wave(n * theta)[:, None, :, None, None] for wave in (np.cos, np.sin))
+    for kind, (even, odd) in enumerate(((c, s), (s, -c))):
+        factor = np.where(np.isin(np.arange(6), COSINE), even, odd)
+        moved = d * np.where([True, False, True], even, odd)
+        energy = (stress * e * factor**2).sum(axis=-1) - solution.eigenvalue * rho * (moved**2).sum(axis=-1)
+        layers[kind] = 2 * float(np.sum(energy * weight))
+        turned = np.swapaxes(Q, -1, -2) @ (stress * factor)[..., TENSOR] @ Q
+        force = solution.eigenvalue * rho * (moved[..., None, :] @ Q)[..., 0, :]
+        push = np.einsum("eabcij,eabcjf,eabc->efi", turned, slopes, weight, optimize=True)
+        push -= np.einsum("eabci,abcf,eabc->efi", force, functions, weight, optimize=True)
+        np.add.at(loads[kind], 3 * nodes.elements[gone][:, :, None] + np.arange(3), push)
     return loads, layers, 2 * float(volume.sum())

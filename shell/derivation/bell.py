@@ -11,7 +11,7 @@ from typing import NamedTuple
 import sympy as sp
 
 from shell.derivation.coriolis import p, pattern_coefficients, q, turning_kinetic_energy
-from shell.derivation.displacements import Displacement, U, V, W, integrate_around
+from shell.derivation.displacements import AMPLITUDES, Displacement, U, V, W, integrate_around, with_angles
 from shell.derivation.energies import surface_energy_of
 from shell.derivation.strains import SPHERE, Deformation, LayerStrains, Radii, derive_deformation, layer_strains
 from shell.derivation.symbols import E, h, n, nu, phi, r, rho, t, theta, z
@@ -124,9 +124,8 @@ def rayleigh_functions(with_factor: bool = True) -> Displacement:
 
 def strain_amplitudes(shape: Displacement, radii: Radii) -> Deformation:
     """Return strains, curvature changes and twist over their cos nθ, cos nθ, sin nθ, of U cos nθ, V sin nθ, W cos nθ."""
-    cosine, sine = sp.cos(n * theta), sp.sin(n * theta)
-    deformation = derive_deformation(Displacement(shape.u * cosine, shape.v * sine, shape.w * cosine), radii)
-    angles = (cosine, cosine, sine) * 2
+    deformation = derive_deformation(with_angles(shape), radii)
+    angles = (sp.cos(n * theta), sp.cos(n * theta), sp.sin(n * theta)) * 2
     return Deformation(*(sp.expand(part / angle) for part, angle in zip(deformation, angles, strict=True)))
 
 
@@ -171,7 +170,7 @@ def galerkin_model() -> GalerkinModel:
     on_sphere, radii = pattern_coefficients(), Radii(rho_1(phi), rho_2(phi))
     area = radii.rho_1 * radii.rho_2 * sp.sin(phi)
     inertia = rho * h * area / (r**2 * sp.sin(phi))
-    amplitudes = strain_amplitudes(Displacement(U(phi), V(phi), W(phi)), radii)
+    amplitudes = strain_amplitudes(AMPLITUDES, radii)
     stiffness = 2 * sp.pi * surface_energy_of(amplitudes) * area
     return GalerkinModel(on_sphere.M * inertia, on_sphere.B * inertia, stiffness)
 

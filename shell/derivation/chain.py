@@ -7,8 +7,7 @@ from typing import Any, TypeAlias
 import sympy as sp
 
 from shell.derivation import coriolis, displacements, energies, frequency, inextensional, strains, temperature
-from shell.derivation.displacements import U, V, W
-from shell.derivation.symbols import n, omega, phi, phi_2, t
+from shell.derivation.symbols import n, omega, phi_2
 
 Row: TypeAlias = tuple[str, str, Any, Any]
 
@@ -86,8 +85,7 @@ def _elasticity() -> list[Row]:
 
 
 def _mode() -> list[Row]:
-    unknown = [function(phi) for function in (U, V, W)]
-    bending = [part.subs(t, 0) for part in inextensional.mode_deformation()[3:]]
+    bending = inextensional.mode_deformation()[3:]
     at_pole = "Powers of φ at the pole: M is infinite there for n > 1, so M = 0 and U = V"
     return [
         ("9", "Conditions of no stretching, for harmonic n", inextensional.inextensional_conditions(), 0),
@@ -102,7 +100,7 @@ def _mode() -> list[Row]:
         ("", "Integration with T = tan(φ/2)", "lnP lnM", inextensional.integrate_separated()),
         ("", "General solution, each with a free factor", "P M", inextensional.general_solution()),
         ("", at_pole, "p_P p_M", inextensional.pole_exponents()),
-        ("10", "The inextensional mode", unknown, inextensional.inextensional_mode()),
+        ("10", "The inextensional mode", displacements.AMPLITUDES, inextensional.inextensional_mode()),
         ("11", "Displacements of the inextensional mode", "u v w", inextensional.inextensional_displacement()),
         ("", "Curvature changes and twist of the inextensional mode", energies.DEFORMATION[3:], bending),
     ]

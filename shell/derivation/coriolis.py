@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import sympy as sp
 
-from shell.derivation.displacements import Displacement, U, V, W, integrate_around
+from shell.derivation.displacements import AMPLITUDES, Displacement, U, V, W, integrate_around
 from shell.derivation.frequency import integrate_in_half_angle, mass_integral, mass_integrand
 from shell.derivation.inextensional import inextensional_mode
 from shell.derivation.strains import frame
@@ -69,7 +69,7 @@ def precession_rate() -> sp.Expr:
 @cache
 def coriolis_integrand() -> sp.Expr:
     """Return the integrand of N in K = N/J: B/(nM) of the inextensional mode gives 2 sin³φ tan²ⁿ(φ/2)."""
-    mode = dict(zip((U(phi), V(phi), W(phi)), inextensional_mode(), strict=True))
+    mode = dict(zip(AMPLITUDES, inextensional_mode(), strict=True))
     coefficients = pattern_coefficients()
     mass = coefficients.M.subs(mode) / mass_integrand()
     ratio = sp.simplify(coefficients.B.subs(mode) / (n * sp.simplify(mass) * sp.tan(phi / 2) ** (2 * n)))

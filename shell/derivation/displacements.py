@@ -25,13 +25,19 @@ def general_displacement() -> Displacement:
     return Displacement(*(sp.Function(name)(phi, theta) for name in "uvw"))
 
 
+AMPLITUDES = Displacement(U(phi), V(phi), W(phi))
+
+
+def with_angles(shape: Displacement) -> Displacement:
+    """Return U cos nθ, V sin nθ, W cos nθ of amplitudes U, V, W."""
+    cosine, sine = sp.cos(n * theta), sp.sin(n * theta)
+    return Displacement(shape.u * cosine, shape.v * sine, shape.w * cosine)
+
+
 @cache
-def harmonic_displacement() -> Displacement:
+def harmonic_displacement(shape: Displacement = AMPLITUDES) -> Displacement:
     """Return HRG paper eq. (1): u = U(φ) cos nθ cos ωt, v = V(φ) sin nθ cos ωt, w = W(φ) cos nθ cos ωt."""
-    swing = sp.cos(omega * t)
-    return Displacement(
-        U(phi) * sp.cos(n * theta) * swing, V(phi) * sp.sin(n * theta) * swing, W(phi) * sp.cos(n * theta) * swing
-    )
+    return Displacement(*(part * sp.cos(omega * t) for part in with_angles(shape)))
 
 
 def kinetic_energy(displacement: Displacement) -> sp.Expr:

@@ -4,9 +4,9 @@ from functools import cache
 
 import sympy as sp
 
-from shell.derivation.displacements import Displacement, U, V, W
+from shell.derivation.displacements import AMPLITUDES, Displacement, U, V, W, harmonic_displacement, with_angles
 from shell.derivation.strains import Deformation, corrected_deformation
-from shell.derivation.symbols import C, in_half_angle, n, omega, phi, r, t, tan_half, theta
+from shell.derivation.symbols import C, in_half_angle, n, phi, r, tan_half, theta
 
 P, M = sp.symbols("P M", cls=sp.Function)  # P = U + V and M = U − V
 
@@ -14,8 +14,7 @@ P, M = sp.symbols("P M", cls=sp.Function)  # P = U + V and M = U − V
 @cache
 def inextensional_conditions() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
     """Return HRG paper eq. (9) for one harmonic, each expression to be zero: ε_φ, ε_θ, ε_φθ without their angles."""
-    shape = Displacement(U(phi) * sp.cos(n * theta), V(phi) * sp.sin(n * theta), W(phi) * sp.cos(n * theta))
-    strain = corrected_deformation(shape)
+    strain = corrected_deformation(with_angles(AMPLITUDES))
     return (
         sp.expand(r * strain.epsilon_phi / sp.cos(n * theta)),
         sp.expand(r * sp.sin(phi) * strain.epsilon_theta / sp.cos(n * theta)),
@@ -88,10 +87,7 @@ def inextensional_mode() -> Displacement:
 @cache
 def inextensional_displacement() -> Displacement:
     """Return HRG paper eq. (11): (10) in (1), with cos nθ, sin nθ and cos ωt."""
-    mode, swing = inextensional_mode(), sp.cos(omega * t)
-    return Displacement(
-        mode.u * sp.cos(n * theta) * swing, mode.v * sp.sin(n * theta) * swing, mode.w * sp.cos(n * theta) * swing
-    )
+    return harmonic_displacement(inextensional_mode())
 
 
 @cache
@@ -100,7 +96,7 @@ def mode_deformation() -> Deformation:
 
     k = C n(n²−1) tanⁿ(φ/2) / (r² sin²φ).
     """
-    deformation = corrected_deformation(Displacement(*(part.subs(t, 0) for part in inextensional_displacement())))
+    deformation = corrected_deformation(with_angles(inextensional_mode()))
     return Deformation(*(_simplify_in_half_angle(part) for part in deformation))
 
 
