@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from shell.blocks import Mesh, Solid, Tie, constrain, find_boundary, mesh_solid, number_functions
+from shell.blocks import Mesh, Solid, Tie, constrain, find_boundary, hold_on_axis, mesh_solid, number_functions
 from shell.cells import CellTable, at_gauss_points, tabulate_cells
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
 from shell.errors import ShellError, mm
@@ -170,15 +170,12 @@ def _anchor(chain: Chain, unknowns: Index, m: int, fresh: int) -> tuple[tuple[tu
 
 
 def _hold_end(rows: Rows, end: End, tie: Tie, n: int) -> None:
-    """Hold a clamped edge, or keep a pole regular: n = 0 only w; n = 1 the translation v = -t_r u; n > 1 nothing."""
-    u, v, w = np.split(np.array(tie.unknowns), np.cumsum([tie.orders[0] + 1, tie.orders[1] + 1]))
-    if end == "clamped" or (end == "pole" and n > 1):
+    """Hold a clamped edge, or keep a pole regular, where a translation is v = -t_r u."""
+    if end == "clamped":
         rows.hold(np.array(tie.unknowns))
-    elif end == "pole" and n == 0:
-        rows.hold(np.concatenate([u, v]))
     elif end == "pole":
-        rows.hold(w)
-        rows.follow(v, u, np.full(len(u), -float(np.round(tie.place.tangent_r[0]))))
+        u, v, w = np.split(np.array(tie.unknowns), np.cumsum([tie.orders[0] + 1, tie.orders[1] + 1]))
+        hold_on_axis(rows, n, u, v, w, -float(np.round(tie.place.tangent_r[0])))
 
 
 def sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> Section:

@@ -134,7 +134,7 @@ def constrain(mesh: Mesh, boundary: Support, ties: tuple[Tie, ...], degree: int,
     on_axis, held = boundary.on_axis, boundary.held
     for own, is_held, axial in ((at_vertices, held, on_axis), (at_edges, held[a] & held[b], on_axis[a] & on_axis[b])):
         rows.hold(own[is_held])
-        _regular_on_axis(rows, own[axial & ~is_held], n)
+        hold_on_axis(rows, n, *np.moveaxis(own[axial & ~is_held], 1, 0))
     for tie, eta in zip(ties, boundary.heights, strict=True):
         there = np.isfinite(eta)
         _follow(rows, at_vertices[there], tie, legendre(max(tie.orders), eta[there]).values[:, None])
@@ -160,17 +160,12 @@ def surface_sides(mesh: Mesh, boundary: Support) -> tuple[tuple[int, int], ...]:
     return tuple(zip(*(index.tolist() for index in np.nonzero(outside[mesh.edges])), strict=True))
 
 
-def _regular_on_axis(rows: Rows, own: Index, n: int) -> None:
-    """Regularity on the axis in cylindrical components: n = 0 only along z; n = 1 a translation; n > 1 nothing."""
-    radial, around, axial = own[:, 0], own[:, 1], own[:, 2]
-    if n == 0:
-        rows.hold(radial)
-        rows.hold(around)
-    elif n == 1:
-        rows.hold(axial)
-        rows.follow(around.ravel(), radial.ravel(), np.full(radial.size, -1.0))
-    else:
-        rows.hold(own)
+def hold_on_axis(rows: Rows, n: int, radial: Index, around: Index, axial: Index, turn: float = -1.0) -> None:
+    """Regularity on the axis: n = 0 only along it; n = 1 a translation, around = `turn` times radial; n > 1 nothing."""
+    for one in {0: (radial, around), 1: (axial,)}.get(n, (radial, around, axial)):
+        rows.hold(one)
+    if n == 1:
+        rows.follow(around, radial, np.full(radial.size, turn))
 
 
 def _follow(rows: Rows, own: Index, tie: Tie, modes: Array) -> None:

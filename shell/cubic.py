@@ -21,7 +21,7 @@ import numpy as np
 from shell.assembly import build_system
 from shell.crystal import Crystal, hill
 from shell.eigen import Factor, find_pattern, lowest_pairs
-from shell.elastic import Elastic, find_constants
+from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.modes import solve_modes
 from shell.quadrature import Array
@@ -112,7 +112,7 @@ def _lowest(systems: list[System], harmonics: list[int], crystal: Cubic, n: int,
     waves: dict[int, Array] = {}
     for system, k, a, b in zip(systems, harmonics, ends, ends[1:], strict=False):
         # K with λ = C₁₂ and G = C₄₄, and M, of the free unknowns of one harmonic
-        elements, mass = system.operators([find_constants(one.table.position, part, False) for one in system.groups])
+        elements, mass = system.operators(system.constants(part))
         elastic = system.pattern.assemble(elements).toarray()
         axial, around, across, shear = _strains(system)
         K[a:b, a:b] = elastic + crystal.excess * (axial.T @ axial + around.T @ around / 2)

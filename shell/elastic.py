@@ -92,11 +92,6 @@ class Constants:
         """The material of some of the elements or stations."""
         return Constants(self.E[where], self.nu[where], self.rho[where], self.plane_stress)
 
-    @property
-    def wave_speed_squared(self) -> float:
-        """Mean G over mean ρ, m²/s²."""
-        return float(np.mean(self.lame[1]) / np.mean(self.rho))
-
 
 def find_constants(position: Array, elastic: Elastic | VaryingElastic, plane_stress: bool) -> Constants:
     """The material at stations with positions (elements, stations) on the meridian."""

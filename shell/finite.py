@@ -14,7 +14,7 @@ import numpy as np
 
 from shell.cells import CellTable, derivatives
 from shell.errors import ShellError
-from shell.kernel import PAIRS, TENSOR, shell_gradients
+from shell.kernel import NO_FORCE, PAIRS, TENSOR, shell_gradients
 from shell.modes import Mode
 from shell.quadrature import Array, gauss
 from shell.solution import Solution
@@ -80,8 +80,7 @@ class QuadraticForce:
         ):
             H = displacement_gradients(solution.system, group, q)
             squares.append(squared(H, doubled))
-            still = np.zeros((*group.table.volume.shape[:2], 3, group.table.volume.shape[2]))
-            stretch.append(partner.table.loads(c.stress(partner.table, squares[-1]) / 2, still))
+            stretch.append(partner.table.loads(c.stress(partner.table, squares[-1]) / 2, NO_FORCE))
             turn.append(gradient_loads(system, partner, _meet(stress[:, :, TENSOR], H, doubled)))
         return cls(system.gather(stretch), system.gather(turn), squares)
 

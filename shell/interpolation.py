@@ -9,7 +9,7 @@ that every |N_j| ≤ 1 and the surplus s_i, the function at the new point minus 
 its term adds anywhere. One evaluation buys one term; the next index is the one whose surplus was the largest.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -85,8 +85,10 @@ class Exploration:
     def refine(self, threshold: float, most: int) -> bool:
         """Grow by at most about `most` evaluations until no surplus on the frontier exceeds the threshold; False where it still does."""
         self.polynomial()
-        for index in self._quadratic():
-            self._settle(index)
+        zero = (0,) * self.dimensions
+        for index in (zero, *(_above(zero, axis) for axis in range(self.dimensions))):  # all terms of the second degree
+            if index not in self._settled:
+                self._settle(index)
         while self.pending > threshold:
             largest = max(self.frontier, key=lambda index: abs(float(self.surpluses[index][0])))
             if len(self.surpluses) >= most or max(largest) + 1 == MOST_POINTS:
@@ -100,13 +102,6 @@ class Exploration:
             self._evaluate((0,) * self.dimensions)
         indices = tuple(sorted(self.surpluses))
         return SparsePolynomial(indices, np.array([self.surpluses[index] for index in indices]))
-
-    def _quadratic(self) -> Iterator[Index]:
-        """0 and the first index of each axis: with their neighbours all terms of the second degree."""
-        zero = (0,) * self.dimensions
-        for index in (zero, *(_above(zero, axis) for axis in range(self.dimensions))):
-            if index not in self._settled:
-                yield index
 
     def _settle(self, index: Index) -> None:
         self._settled.add(index)

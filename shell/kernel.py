@@ -21,6 +21,7 @@ from shell.quadrature import Array, Basis, legendre
 SHEAR_CORRECTION = 5 / 6
 Orders = tuple[int, int, int]
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of the axes, in the order of strains
+NO_STRESS, NO_FORCE = np.zeros((1, 1, 6, 1)), np.zeros((1, 1, 3, 1))  # everywhere; see `StrainTable.loads`
 TENSOR = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])  # places of the components in that order
 
 
@@ -149,21 +150,20 @@ def station_mass(table: StrainTable) -> Array:
     return np.asarray(np.swapaxes(moved, -1, -2) @ moved)
 
 
-def integrate_stiffness(stations: Array, along: Array) -> Array:
-    """Sum the stations of each element into its stiffness: (elements, size, size), unknowns ordered (function, amplitude)."""
-    elements, count, double, _ = stations.shape
-    m, functions = double // 2, along.shape[2]
+def integrate(stations: Array, along: Array) -> Array:
+    """Sum the stations of each element into its matrix: (elements, size, size), unknowns ordered (function, amplitude).
+
+    `along` has the values of the functions, and for a stiffness their ξ-derivatives.
+    """
+    elements, count, width, _ = stations.shape
+    kinds, _, functions = along.shape
+    m = width // kinds
     pairs = np.einsum("dia,eib->abide", along, along).reshape(functions**2, -1)
-    inner = stations.reshape(elements, count, 2, m, 2, m).transpose(0, 1, 2, 4, 3, 5).reshape(elements, -1, m * m)
-    return _unravel(pairs @ inner, functions)
-
-
-def integrate_mass(stations: Array, along: Array) -> Array:
-    """Sum the stations of each element into its mass: (elements, size, size)."""
-    elements, count, m, _ = stations.shape
-    functions = along.shape[2]
-    pairs = np.einsum("ia,ib->abi", along[0], along[0]).reshape(functions**2, -1)
-    return _unravel(pairs @ stations.reshape(elements, count, m * m), functions)
+    inner = (
+        stations.reshape(elements, count, kinds, m, kinds, m).transpose(0, 1, 2, 4, 3, 5).reshape(elements, -1, m * m)
+    )
+    blocks = (pairs @ inner).reshape(elements, functions, functions, m, m).transpose(0, 1, 3, 2, 4)
+    return np.asarray(blocks.reshape(elements, functions * m, functions * m))
 
 
 def _tall(per_station: Array) -> NDArray[np.float64]:
@@ -186,10 +186,3 @@ def _jets(section: Section, through: Orders, points: Array) -> tuple[list[Array]
         for kind, one in zip(found, (value, d_xi / ds - drift * d_eta, 2 / h * d_eta), strict=True):
             kind.append(one)
     return found
-
-
-def _unravel(integrals: Array, functions: int) -> Array:
-    """From pairs of functions and pairs of amplitudes, (elements, functions², m²), to matrices."""
-    elements, m = len(integrals), round(np.sqrt(integrals.shape[2]))
-    blocks = integrals.reshape(elements, functions, functions, m, m).transpose(0, 1, 3, 2, 4)
-    return blocks.reshape(elements, functions * m, functions * m)

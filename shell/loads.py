@@ -21,7 +21,7 @@ from shell.elastic import COSINE, SINE, Elastic
 from shell.errors import ShellError
 from shell.finite import displacement_gradients, solved_as_solid
 from shell.inertia import MassProperties, weigh
-from shell.kernel import TENSOR, StrainTable
+from shell.kernel import NO_FORCE, NO_STRESS, TENSOR, StrainTable
 from shell.modes import Mode
 from shell.prestress import expansion_shares, mean_answer, neighbour, settle
 from shell.quadrature import Array
@@ -30,6 +30,7 @@ from shell.system import Group, System
 
 Kind = Literal["axial", "lateral", "spin", "pressure", "cooling"]
 WAVES: dict[Kind, int] = {"axial": 0, "lateral": 1, "spin": 0, "pressure": 0, "cooling": 0}
+ALL_ROUND = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])[:, None]  # stress of a unit pressure
 AZIMUTHS = np.linspace(0.0, pi, 13)
 ACROSS = np.linspace(-1.0, 1.0, 9) * (1 - 1e-9)  # of a cell; its edges, but not the axis, where φ/r is 0/0
 
@@ -98,12 +99,11 @@ class Loads:
         rho, bulk = self.elastic.rho, self.elastic.E / (3 * (1 - 2 * self.elastic.nu))
         found = []
         for group in system.groups:
-            shape = group.table.volume.shape
-            stress, force = np.zeros((*shape[:2], 6, shape[2])), np.zeros((*shape[:2], 3, shape[2]))
+            shape, stress, force = group.table.volume.shape, NO_STRESS, NO_FORCE
             if kind == "pressure":
-                stress[:, :, :3] = 1.0
+                stress = ALL_ROUND + NO_STRESS
             elif kind == "cooling":
-                stress[:, :, :3] = 3 * bulk * self.away(group.table.position)[..., None, None]
+                stress = 3 * bulk * self.away(group.table.position)[..., None, None] * ALL_ROUND
             elif kind == "spin":
                 force = directed(group, rho * group.places[0])
             elif kind == "axial":

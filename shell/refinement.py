@@ -8,7 +8,7 @@ import numpy as np
 
 from shell.assembly import build_system
 from shell.eigen import Factor, lowest_pairs
-from shell.elastic import Elastic, VaryingElastic, find_constants
+from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.layout import FIRST, KINDS, LONGEST, ROUGH, Kind, Level, Theory, crowding
 from shell.quadrature import Array
@@ -140,7 +140,7 @@ def solve_level(
 
     Returns them, what the iteration left undone of each, and the factor of the stiffness over `_density`.
     """
-    constants = tuple(find_constants(one.table.position, elastic, one.table.plane_stress) for one in system.groups)
+    constants = system.constants(elastic)
     wanted = count + system.rigid_motions
     K, mass = system.operators(constants, system.shift(constants, size), over=_density(elastic))
     factor = Factor(system.pattern, K)

@@ -20,12 +20,11 @@ from shell.eigen import Factor
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.finite import solved_as_solid
+from shell.kernel import NO_STRESS
 from shell.loads import directed
 from shell.modes import Mode
 from shell.prestress import answer_without, mean_answer, neighbour
-from shell.quadrature import Array
 from shell.solution import radial, total
-from shell.system import Group
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
         raise ShellError("the second-order effect of spin is computed for the lowest mode of a harmonic from 2 up.")
     system, mass, eigenvalue = solution.system, total(solution.kinetic), solution.eigenvalue
     rest = neighbour(mode, 0)
-    pull = [_pull(group, elastic.rho * directed(group, group.places[0])) for group in rest.groups]
+    pull = [-g.table.loads(NO_STRESS, elastic.rho * directed(g, g.places[0])) for g in rest.groups]
     stiffening = 4 * float(mean_answer(mode)[0].vector @ rest.gather(pull)) / mass
     around = [(radial(group, d), d[:, :, 1]) for group, d in zip(system.groups, solution.displacement, strict=True)]
     softening = sum(
@@ -60,7 +59,7 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
     for group, (r, t) in zip(system.groups, around, strict=True):
         force = directed(group, elastic.rho * t)
         force[:, :, 1] = elastic.rho * r
-        forces.append(_pull(group, force))
+        forces.append(-group.table.loads(NO_STRESS, force))
     load = system.gather(forces)
     g = float(solution.vector @ load) / mass
     # (K - λ M)⁺ f without the mode itself, which all higher modes let converge
@@ -71,9 +70,3 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
     return SpinShift(
         stiffening / (2 * eigenvalue), -softening / mass / (2 * eigenvalue), g**2 / (2 * eigenvalue) - 2 * others / mass
     )
-
-
-def _pull(group: Group, force: Array) -> Array:
-    """Loads of forces per volume on the functions of a group."""
-    elements, stations, points = group.table.volume.shape
-    return -group.table.loads(np.zeros((elements, stations, 6, points)), force)

@@ -23,7 +23,7 @@ from shell.blocks import open_edges
 from shell.cells import CellTable, Reference, at_gauss_points, cell_stiffness, in_order, tabulate_cells
 from shell.eigen import Factor, Pattern, find_pattern
 from shell.elastic import Elastic, VaryingElastic, find_constants
-from shell.kernel import StrainTable, integrate_stiffness, shell_table, station_stiffness
+from shell.kernel import StrainTable, integrate, shell_table, station_stiffness
 from shell.layout import Chain, Level
 from shell.quadrature import Array, at_gauss, gauss, hierarchic, values_to_hierarchic
 from shell.resonator import Resonator
@@ -101,7 +101,7 @@ class ShellExtension:
             for members, own, places in zip(self.pattern.unknowns, r, self.places, strict=True):
                 loads[members, k] += own[places]
         lam, G = (field[..., None, None] for field in constants.lame)
-        whole = integrate_stiffness(lam * self.stations[0] + G * self.stations[1], self.table.along)
+        whole = integrate(lam * self.stations[0] + G * self.stations[1], self.table.along)
         K = [one[np.ix_(here, here)] for one, here in zip(whole, self.places, strict=True)]
         x = Factor(self.pattern, K).solve(loads)
         answers = []

@@ -1,6 +1,6 @@
 """Elements and their matrices: groups of one kind, and the system of all of them on the free unknowns."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, TypeAlias
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
 from shell.eigen import Pattern, find_pattern
-from shell.elastic import Constants
-from shell.kernel import Section, StrainTable, integrate_mass, integrate_stiffness, station_mass, station_stiffness
+from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
+from shell.kernel import Section, StrainTable, integrate, station_mass, station_stiffness
 from shell.layout import Chain, Level
 from shell.quadrature import Array, gauss
 from shell.sparse import Index
@@ -31,16 +31,16 @@ class ShellGroup:
     section: Section  # the middle surface at the stations
     anchors: tuple[tuple[int, int], ...] = ()
 
-    def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array) -> Array:
-        """Integrals over the elements of their station matrices, in the unknowns that are solved for.
+    def matrices(self, stations: Array, along: Array) -> Array:
+        """Integrals over the elements of their station matrices, in the unknowns that are solved for; `along` as `integrate` takes it.
 
         At a free edge (`anchors`) these are differences: else stiff shear would drown the bending as (R/h)³, not (R/h)².
         """
-        found = integrate(stations, self.table.along)
+        found = integrate(stations, along)
         for element, node in self.anchors:
-            along = self.table.along.copy()
-            along[0, :, node], along[1, :, node] = 1.0, 0.0
-            found[element] = integrate(stations[[element]], along)[0]
+            own = along.copy()
+            own[0, :, node], own[1:, :, node] = 1.0, 0.0
+            found[element] = integrate(stations[[element]], own)[0]
         return found
 
     def plain(self, size: int) -> "scipy.sparse.csr_matrix":
@@ -83,8 +83,8 @@ class ShellGroup:
         """Stiffness plus `shift` times mass, and mass, of all elements with λ, G, ρ at their stations."""
         dilation, shear, mass = self.stations
         stiffness = lam[..., None, None] * dilation + G[..., None, None] * shear
-        M = self.matrices(integrate_mass, rho[..., None, None] * mass)
-        return self.matrices(integrate_stiffness, stiffness) + shift * M, M
+        M = self.matrices(rho[..., None, None] * mass, self.table.along[:1])
+        return self.matrices(stiffness, self.table.along) + shift * M, M
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,9 +187,14 @@ class System:
         """Bytes of the element matrices while a system is solved: stiffness, mass, their factors."""
         return 32.0 * float(sum(group.unknowns.size * group.unknowns.shape[1] for group in self.groups))
 
+    def constants(self, elastic: Elastic | VaryingElastic) -> tuple[Constants, ...]:
+        """The material at the stations of every group."""
+        return tuple(find_constants(g.table.position, elastic, g.table.plane_stress) for g in self.groups)
+
     def shift(self, constants: Sequence[Constants], size: float) -> float:
         """A small ω² (1/s²) which, with the mass, factors the rigid motions and leaves the elastic modes of a body of radius `size` in order."""
-        return 1e-2 * constants[0].wave_speed_squared / size**2 if self.rigid_motions else 0.0
+        wave_speed_squared = float(np.mean(constants[0].lame[1]) / np.mean(constants[0].rho))
+        return 1e-2 * wave_speed_squared / size**2 if self.rigid_motions else 0.0
 
     def operators(
         self, constants: Sequence[Constants], shift: float = 0.0, over: float = 1.0

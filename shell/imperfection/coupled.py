@@ -21,7 +21,7 @@ from math import pi, sqrt
 import numpy as np
 
 from shell.assembly import build_system
-from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
+from shell.elastic import Constants, Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.imperfection.block import Block, Together, condense
 from shell.imperfection.body import Body, Core
@@ -62,8 +62,7 @@ class CoupledHarmonics:
     @cached_property
     def constants(self) -> tuple[Constants, ...]:
         """The material of every group."""
-        groups = self.system(self.n).groups
-        return tuple(find_constants(g.table.position, self.elastic, g.table.plane_stress) for g in groups)
+        return self.system(self.n).constants(self.elastic)
 
     @cached_property
     def pair(self) -> tuple[float, Array]:
