@@ -180,14 +180,9 @@ def _hold_end(rows: Rows, end: End, tie: Tie, n: int) -> None:
 
 def sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> Section:
     """The middle surface at ξ of every element of a chain."""
-    names = tuple(MiddleSurface.__dataclass_fields__)
-    breaks, segments = np.array(chain.breaks), np.array(chain.segments)
+    breaks = np.array(chain.breaks)
     halves = np.diff(breaks) / 2
     s = (breaks[:-1] + halves)[:, None] + halves[:, None] * xi
-    gathered = {name: np.empty(s.shape) for name in names}
-    for segment in np.unique(segments):
-        there = segments == segment
-        points = resonator.at(s[there].ravel(), int(segment))
-        for name in names:
-            gathered[name][there] = getattr(points, name).reshape(-1, len(xi))
-    return Section(**gathered, ds=np.broadcast_to(halves[:, None], s.shape), weight=np.broadcast_to(weights, s.shape))
+    points = resonator.at(s.ravel(), np.repeat(chain.segments, len(xi)))
+    surface = {name: getattr(points, name).reshape(s.shape) for name in MiddleSurface.__dataclass_fields__}
+    return Section(**surface, ds=np.broadcast_to(halves[:, None], s.shape), weight=np.broadcast_to(weights, s.shape))

@@ -103,10 +103,9 @@ class FrequencyLaw:
         T = np.asarray(temperature, dtype=float)
         return np.asarray(self._spline(T if extrapolate else self._check(T)))
 
-    def slope(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
-        """Return d ln f/dT, 1/K; arguments as in `frequency`."""
-        T = np.asarray(temperature, dtype=float)
-        return np.asarray(self._spline(T if extrapolate else self._check(T), 1))
+    def slope(self, temperature: ArrayLike) -> Array:
+        """Return d ln f/dT, 1/K."""
+        return np.asarray(self._spline(self._check(temperature), 1))
 
     def parts(self, temperature: ArrayLike) -> SlopeParts:
         """The five parts of d ln f/dT (HRG paper eq. 15), and that of the base."""

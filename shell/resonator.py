@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.polynomial.legendre import legder, legval
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from shell.curves import Curve, scaled
 from shell.errors import ShellError, mm, require_numbers
@@ -123,17 +123,19 @@ class Resonator:
         """Whether the meridian ends at a pole (a closed shell)."""
         return self.segments[-1].end_points[1][0] <= 1e-9 * self.length
 
-    def at(self, arc_length: ArrayLike, segment: int | None = None) -> MeridianPoints:
+    def at(self, arc_length: ArrayLike, segment: int | NDArray[np.intp] | None = None) -> MeridianPoints:
         """The middle surface at given arc lengths (m); at a joint, `segment` says on which of the two curves."""
         s = np.atleast_1d(np.asarray(arc_length, dtype=float))
-        if segment is not None:
+        if isinstance(segment, int):
             return self._on_segment(s, segment)
-        which = np.clip(np.searchsorted(np.array(self._starts), s, side="right") - 1, 0, len(self.segments) - 1)
+        if segment is None:
+            after = np.searchsorted(np.array(self._starts), s, side="right")
+            segment = np.clip(after - 1, 0, len(self.segments) - 1)
         joined = {name: np.empty_like(s) for name in MeridianPoints.__dataclass_fields__}
-        for k in np.unique(which):
-            piece = self._on_segment(s[which == k], int(k))
+        for k in np.unique(segment):
+            piece = self._on_segment(s[segment == k], int(k))
             for name, values in joined.items():
-                values[which == k] = getattr(piece, name)
+                values[segment == k] = getattr(piece, name)
         return MeridianPoints(**joined)
 
     def surface(self, eta: float, segment: int | None = None) -> Callable[[Array], tuple[Array, Array]]:

@@ -98,7 +98,7 @@ class PolynomialLaw:
             raise ShellError(f"the polynomial of the frequency is negative {np.ptp(x):.0f} K from its reference.")
         return np.asarray(np.log(self.f0) + np.log1p(change))
 
-    def slope(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
+    def slope(self, temperature: ArrayLike) -> Array:
         """Return d ln f/dT, 1/K."""
         x = np.asarray(temperature, dtype=float) - self.reference_temperature
         a1, a2, a3 = self.coefficients
