@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from shell.errors import FoldedCells
+from shell.errors import ShellError
 from shell.kernel import PAIRS, energy_weights
 from shell.quadrature import Array, Basis, gauss, hierarchic, nodal
 from shell.sparse import Index
@@ -175,7 +175,7 @@ def tabulate_cells(grid: Array, place: Reference, n: int, position: float) -> Ce
     r_eta, z_eta = (_interpolate(x, along.values, across.slopes) for x in grid)
     det = r_xi * z_eta - r_eta * z_xi
     if not np.all(det * det[:, :1] > 0):
-        raise FoldedCells(
+        raise ShellError(
             f"the root, corner or clamp at {100 * position:.3g} % of the meridian cannot be divided into cells that do not overlap: "
             "its faces meet too sharply for the thickness. Change the stem, its fillet, or the thickness there."
         )

@@ -6,13 +6,12 @@ from math import hypot, tan
 import numpy as np
 
 from shell.blocks import Solid
+from shell.curves import Point
 from shell.errors import ShellError
 from shell.layout import SMOOTH_JOINT
 from shell.patches import Cell, Patch, along, box, narrowed, rings, shrinking, straight, whole
 from shell.points import MeridianPoints
 from shell.resonator import Resonator
-
-Spot = tuple[float, float]
 
 COLLAR = 1.5  # width of the solid strip beside a corner, in thicknesses
 NARROW = 0.15  # share of it that the cell at a stiff tie takes
@@ -153,10 +152,10 @@ def _strip(
     )  # fmt: skip
 
 
-def _face(points: MeridianPoints, eta: float) -> Spot:
+def _face(points: MeridianPoints, eta: float) -> Point:
     r, z = points.at_heights([eta])
     return float(r[0, 0]), float(z[0, 0])
 
 
-def _tangent(points: MeridianPoints) -> Spot:
+def _tangent(points: MeridianPoints) -> Point:
     return float(points.tangent_r[0]), float(points.tangent_z[0])

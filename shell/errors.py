@@ -12,10 +12,6 @@ class ShellError(ValueError):
     """An input that `shell` cannot use; the message says what is wrong and how to mend it."""
 
 
-class FoldedCells(ShellError):
-    """A solid part whose cells would overlap."""
-
-
 def require_numbers(of: str, *values: object) -> None:
     """Refuse what is no number, before it is compared with one."""
     for value in values:

@@ -20,12 +20,13 @@ from math import atan2, ceil, dist, log, pi
 import numpy as np
 
 from shell.blocks import Solid
+from shell.curves import Point
 from shell.errors import ShellError, mm
 from shell.layout import OTHERS, Level
 from shell.patches import Patch, Path, Planar, along, circular, layers, rings, shrinking, straight, whole
 from shell.quadrature import Array
 from shell.resonator import Resonator, Stem
-from shell.stem import Base, Spot, arc_at_radius, columns_of, crossing, find_base, lay_rows, mesh_stem, point_on
+from shell.stem import Base, arc_at_radius, columns_of, crossing, find_base, lay_rows, mesh_stem, point_on
 
 COLLAR = 1.5  # width of the solid ring around the root, in thicknesses
 FILLET_SHRINK = 0.3
@@ -39,9 +40,9 @@ class Contact:
     face: int
     end: float
     s: float
-    center: Spot
-    on_dome: Spot
-    on_stem: Spot
+    center: Point
+    on_dome: Point
+    on_stem: Point
 
     @property
     def turn(self) -> tuple[float, float]:
@@ -188,7 +189,7 @@ def _half_root(resonator: Resonator, stem: Stem, frame: Frame, which: int, steps
 
 
 def _fillet(
-    contact: Contact, radius: float, cross: Path, roof: Path, floor: Path, wall: Path, over: Spot,
+    contact: Contact, radius: float, cross: Path, roof: Path, floor: Path, wall: Path, over: Point,
     steps: tuple[float, ...], cuts: tuple[float, ...],
 ) -> list[Patch]:  # fmt: skip
     """Two patches that meet on the line from the middle of the fillet to X."""

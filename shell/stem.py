@@ -7,11 +7,10 @@ from math import ceil
 
 import numpy as np
 
+from shell.curves import Point
 from shell.patches import Cell, Patch, Path, Planar, rings, straight, whole
 from shell.quadrature import Array
 from shell.resonator import Resonator, Stem
-
-Spot = tuple[float, float]
 
 QUIET = 2.5  # stem lengths over its radius from which its clamp is not felt by n > 1
 
@@ -117,7 +116,7 @@ def crossing(value: Callable[[Array], Array], low: float, high: float) -> float:
     return float((low + high) / 2)
 
 
-def point_on(surface: Callable[[Array], Planar], s: float) -> Spot:
+def point_on(surface: Callable[[Array], Planar], s: float) -> Point:
     """Return the point of a surface at an arc length."""
     r, z = surface(np.array([s]))
     return float(r[0]), float(z[0])

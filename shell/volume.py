@@ -25,8 +25,7 @@ from shell.errors import ShellError, mm
 from shell.layout import Level
 from shell.quadrature import Array, nodal
 from shell.resonator import Resonator
-
-Index = NDArray[np.intp]
+from shell.sparse import Index
 
 LEVEL = Level((3, 3, 3), 9, 8, 1)  # cells of degree 8 carry the shape of fillets; one ring around a sharp corner
 # places (ξ, η, θ) on the lattice 0, 1, 2 of a turned quadrilateral, in the order that VTK and Abaqus share
