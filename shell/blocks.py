@@ -51,6 +51,15 @@ class Mesh:
         along, across = (nodal(self.grid.shape[2] - 1, x).values for x in (xi, eta))
         return np.asarray(along @ self.grid[:, cells] @ across.T)
 
+    def between(self, vertices: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """The edges that have both of their vertices among these."""
+        return np.asarray(vertices[self.pairs].all(axis=1))
+
+    @property
+    def outside(self) -> NDArray[np.bool_]:
+        """The edges of one cell alone."""
+        return np.asarray(np.bincount(self.edges.ravel()) == 1)
+
 
 SIDES = ((0, 1), (2, 3), (0, 2), (1, 3))
 
@@ -132,7 +141,7 @@ def constrain(mesh: Mesh, boundary: Support, ties: tuple[Tie, ...], degree: int,
     at_edges = start + 3 * count + np.arange(3 * inside * len(a)).reshape(-1, inside, 3).transpose(0, 2, 1)
     rows = Rows()
     on_axis, held = boundary.on_axis, boundary.held
-    for own, is_held, axial in ((at_vertices, held, on_axis), (at_edges, held[a] & held[b], on_axis[a] & on_axis[b])):
+    for own, is_held, axial in ((at_vertices, held, on_axis), (at_edges, *map(mesh.between, (held, on_axis)))):
         rows.hold(own[is_held])
         hold_on_axis(rows, n, *np.moveaxis(own[axial & ~is_held], 1, 0))
     for tie, eta in zip(ties, boundary.heights, strict=True):
@@ -147,17 +156,13 @@ def constrain(mesh: Mesh, boundary: Support, ties: tuple[Tie, ...], degree: int,
 
 def open_edges(mesh: Mesh, boundary: Support) -> NDArray[np.bool_]:
     """The edges that are neither on the axis nor held nor tied."""
-    a, b = mesh.pairs.T
-    return np.asarray(~np.any([where[a] & where[b] for where in boundary.kinds], axis=0))
+    return np.asarray(~np.any([mesh.between(where) for where in boundary.kinds], axis=0))
 
 
 def surface_sides(mesh: Mesh, boundary: Support) -> tuple[tuple[int, int], ...]:
     """The sides (cell, side) that no other cell shares, that are not tied and do not lie on the axis."""
-    a, b = mesh.pairs.T
-    outside = np.bincount(mesh.edges.ravel()) == 1
-    for where in (boundary.on_axis, *boundary.kinds[2:]):
-        outside &= ~(where[a] & where[b])
-    return tuple(zip(*(index.tolist() for index in np.nonzero(outside[mesh.edges])), strict=True))
+    free = mesh.outside & ~np.any([mesh.between(where) for where in (boundary.on_axis, *boundary.kinds[2:])], axis=0)
+    return tuple(zip(*(index.tolist() for index in np.nonzero(free[mesh.edges])), strict=True))
 
 
 def hold_on_axis(rows: Rows, n: int, radial: Index, around: Index, axial: Index, turn: float = -1.0) -> None:

@@ -108,9 +108,7 @@ def _cut_section(resonator: Resonator, layers: int, spacing: float) -> Pieces:
 
 def _divide_cells(mesh: Mesh, boundary: Support, count: int, grids: list[Array], held: list[NDArray[np.bool_]]) -> None:
     along = nodal(mesh.grid.shape[2] - 1, np.linspace(-1.0, 1.0, 2 * count + 1)).values
-    outside = np.bincount(mesh.edges.ravel()) == 1
-    a, b = mesh.pairs.T
-    fixed = outside & boundary.held[a] & boundary.held[b]
+    fixed = mesh.outside & mesh.between(boundary.held)
     for cell in range(len(mesh.vertices)):
         grids.append(np.einsum("ia,gab,jb->gij", along, mesh.grid[:, cell], along))
         marks = np.zeros((2 * count + 1, 2 * count + 1), dtype=bool)

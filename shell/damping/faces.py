@@ -138,8 +138,7 @@ def _sides(solution: Solution, group: SolidGroup, c: Constants, q: Array) -> lis
     mesh, boundary = group.mesh, group.boundary
     degree = mesh.grid.shape[2] - 1
     points, weights = gauss(degree + 2)
-    a, b = mesh.pairs.T
-    held = boundary.held[a] & boundary.held[b]
+    held = mesh.between(boundary.held)
     open_sides = [(cell, side) for cell, side in surface_sides(mesh, boundary) if not held[mesh.edges[cell, side]]]
     found = []
     for side, (xi, eta) in enumerate(SIDES):

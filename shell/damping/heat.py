@@ -61,8 +61,7 @@ def _on_axis(solution: Solution, group: SolidGroup, size: int) -> np.ndarray:
         return np.zeros(0, dtype=np.intp)
     mesh, axis = group.mesh, group.boundary.on_axis
     inside = mesh.grid.shape[2] - 2
-    a, b = mesh.pairs.T
-    edges = np.flatnonzero(axis[a] & axis[b])
+    edges = np.flatnonzero(mesh.between(axis))
     return np.concatenate([np.flatnonzero(axis), (len(axis) + inside * edges[:, None] + np.arange(inside)).ravel()])
 
 

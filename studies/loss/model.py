@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from shell.constants import zero_Celsius
-from shell.damping.anchor import Unbalance, anchor_loss, unbalance_loss
+from shell.damping.anchor import anchor_loss, unbalance_loss
 from shell.damping.anisotropy import Complex, Ripple, damping_wave, surface_weight
 from shell.damping.budget import (
     Budget,
@@ -27,7 +27,6 @@ from shell.damping.faces import Vibration
 from shell.damping.gas import GASES, gas_loss, most_squeezed
 from shell.damping.heat import Heat
 from shell.damping.sources import known_losses
-from shell.elastic import Elastic
 from shell.imperfection import Pair
 from shell.layout import Theory
 from shell.modes import Mode
@@ -198,10 +197,7 @@ def _surface_ripple(parts: LossParts, vibration: Vibration, causes: Sequence[Los
     return [Ripple("surface", parts.surface_anisotropy, angle, surface_weight(vibration.surfaces))]
 
 
-@lru_cache(maxsize=8)
-def _unbalance(mode: Mode, elastic: Elastic) -> Unbalance:
-    """What an unbalanced rim costs the mode n = 2; kept, since many values of a card leave it as it is."""
-    return unbalance_loss(mode, elastic)
+_unbalance = lru_cache(maxsize=8)(unbalance_loss)  # kept, since many values of a card leave it as it is
 
 
 def _others(
