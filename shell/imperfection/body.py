@@ -1,9 +1,8 @@
 """The difference between the imperfect and the perfect resonator: products of δK and δM with vectors, by quadrature."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from math import pi
-from typing import TypeAlias
 
 import numpy as np
 
@@ -16,9 +15,6 @@ from shell.imperfection.wall import ALONG, AROUND, Around, Stretch, Wall, go_aro
 from shell.kernel import Section
 from shell.quadrature import Array, Basis
 
-Energies: TypeAlias = Callable[[Block, Block], tuple[Array, Array]]
-"""Of two harmonics, what goes as the cosine and what goes as the sine, (shared, shared) each."""
-
 
 class Core:
     """Energies of one solid part (root, corner, clamp) between any two harmonics, per unit of the unknowns that it shares with the shell.
@@ -30,36 +26,33 @@ class Core:
         self.number, self.constants = number, constants
         self._section, self._energies = cache(self._find_section), cache(self._find_energies)
 
-    def respond(self, X: Array, energies: Energies, weight: Array, around: Around, together: Together) -> Array:
-        """What a change of its material does to vectors (unknowns, vectors, 2)."""
-        found = np.zeros_like(X)
-        cosine, sine = ((one * weight) @ one.T for one in (around.cosine, around.sine))
-        least = 1e-14 * float(np.abs(weight).sum())
+    def respond(self, X: Array, changes: Sequence[Array], around: Around, together: Together) -> tuple[Array, Array]:
+        """δK and δM times vectors (unknowns, vectors, 2), for changes of E and of ρ."""
+        found = np.zeros_like(X), np.zeros_like(X)
+        turns = [[(one * change) @ one.T for one in (around.cosine, around.sine)] for change in changes]
+        least = [1e-14 * float(np.abs(change).sum()) for change in changes]
         parts = list(enumerate(zip(together.blocks, together.rows, strict=True)))
         for j, (other, columns) in parts:
             moved = X[columns][other.shared]
             for i, (block, rows) in parts if moved.any() else ():
                 here = np.s_[2 * i : 2 * i + 2, 2 * j : 2 * j + 2]
-                if max(np.abs(cosine[here]).max(), np.abs(sine[here]).max()) > least:
-                    one, two = (np.tensordot(part, moved, 1) for part in energies(block, other))
-                    found[rows][block.shared] += one @ cosine[here].T + two @ sine[here].T
+                for k, both in enumerate(turns):
+                    if max(np.abs(turn[here]).max() for turn in both) > least[k]:
+                        energies = zip(self._energies(block, other)[k], both, strict=True)
+                        forces = (np.tensordot(energy, moved, 1) @ turn[here].T for energy, turn in energies)
+                        found[k][rows][block.shared] += sum(forces)
         return found
 
-    def stiffness(self, one: Block, other: Block) -> tuple[Array, Array]:
-        """Energies of strains."""
-        return self._energies(one, other)[:2]  # type: ignore[return-value]
-
-    def mass(self, one: Block, other: Block) -> tuple[Array, Array]:
-        """Energies of displacements per s⁻²."""
-        return self._energies(one, other)[2:]  # type: ignore[return-value]
-
-    def _find_energies(self, one: Block, other: Block) -> tuple[Array, ...]:
+    def _find_energies(self, one: Block, other: Block) -> tuple[list[Array], list[Array]]:
+        """Of strains and of displacements per s⁻², what goes as the cosine and what goes as the sine, (shared, shared) each."""
         (e, d), (f, g), table = self._section(one), self._section(other), one.system.solids[self.number].table
         volume = table.volume[:, :, None]
         stress = self.constants.stress(table, f) * volume
         momentum = self.constants.rho[..., None, None] * volume * g
-        pairs = [(e, stress, some) for some in (COSINE, SINE)] + [(d, momentum, some) for some in (ALONG, AROUND)]
-        return tuple(_flat(a[..., some, :]) @ _flat(b[..., some, :]).T for a, b, some in pairs)
+        return (
+            [_flat(e[..., some, :]) @ _flat(stress[..., some, :]).T for some in (COSINE, SINE)],
+            [_flat(d[..., some, :]) @ _flat(momentum[..., some, :]).T for some in (ALONG, AROUND)],
+        )
 
     def _find_section(self, block: Block) -> tuple[Array, Array]:
         """Strains and displacements per unit of every shared unknown."""
@@ -117,9 +110,9 @@ class Body:
                 at = u[:, component].transpose(1, 0, 2).reshape(vectors, -1) @ turn
                 pull[:, component] = ((at * masses) @ turn.T).reshape(vectors, -1, 2).transpose(1, 0, 2)
             heavy += (pulled @ pull.reshape(-1, 2 * vectors)).reshape(X.shape)
-        for core, stiffer, heavier in self.cores:
-            change += core.respond(X, core.stiffness, stiffer, self.around, self.together)
-            heavy += core.respond(X, core.mass, heavier, self.around, self.together)
+        for core, *changes in self.cores:
+            stiff, more = core.respond(X, changes, self.around, self.together)
+            change, heavy = change + stiff, heavy + more
         return change - value * heavy, mass + heavy
 
 
