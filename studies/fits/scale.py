@@ -1,6 +1,6 @@
 """The compensation chain of a bell-shaped gyro as a study: runs sorted by what they show, figures after every step."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -22,6 +22,9 @@ from studies.record import Record
 from studies.record.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
 
 STEPS = ("rough", "bias_compensated", "rate_compensated", "temperature_compensated", "filtered")
+MISREAD = {"has the opposite sign": -1.0, "is in rad/s": 180.0 / np.pi, "is in °/h": 1 / 3600}
+"""Times by which an output changes more with an applied rate that is so."""
+AS = 1.2  # times by which that may be missed: the scale over temperature, another gyro of the lot
 STEADY = 0.01  # part of the rate by which a rate table may waver and still turn at one rate
 SHORT, LONG = 1.0, 100.0  # s, at which the random walk is read: a filter of 5 s changes the first, not the second
 
@@ -105,10 +108,10 @@ def study_scale(records: Sequence[Record], cutoff: float | None, order: int) -> 
     column = choose_column(records, TEMPERATURES, "a fit of the scale over temperature")
     sorted_runs: dict[str, tuple[BellRun, str]] = {}
     tables: list[BellRun] = []
-    left_out = 0
-    for record in records:
-        run, missing = _read_run(record, output, column)
-        left_out += missing
+    read = [_read_run(record, output, column) for record in records]
+    left_out = sum(missing for _, missing in read)
+    _check_applied({record.path: run for record, (run, _) in zip(records, read, strict=True)}, output)
+    for record, (run, _) in zip(records, read, strict=True):
         kind = _classify(run, record.path)
         if kind == TABLES or (kind == next(iter(KINDS)) and kind in sorted_runs):
             tables.append(run)
@@ -203,6 +206,26 @@ def _classify(run: BellRun, path: str) -> str:
     if not swept:
         raise InputError(f"{path}: neither rate nor temperature changes; it cannot calibrate the chain.")
     return at_rest if abs(np.mean(run.rate)) <= LARGEST_REST else turning
+
+
+def _check_applied(runs: Mapping[str, BellRun], output: str) -> None:
+    """Refuse an applied rate with which an output changes as with one of the opposite sign or another unit; a measured rate by itself, counts beside the other runs."""
+    lines = {path: np.polyfit(run.rate, run.output, 1) for path, run in runs.items() if np.ptp(run.rate) > LARGEST_REST}
+    null = float(np.median([line[1] for line in lines.values()])) if lines else np.nan
+    gains = {
+        path: float(lines[path][0] if path in lines else (run.output.mean() - null) / run.rate.mean())
+        for path, run in runs.items()
+        if np.max(np.abs(run.rate)) > LARGEST_REST
+    }
+    for path, gain in gains.items():
+        others = [1.0] if output != RAW[0] else [own for other, own in gains.items() if other != path]
+        for words, times in MISREAD.items():
+            if others and 1 / AS < gain / (times * float(np.median(others)) or np.nan) < AS:
+                which = " or ".join(gains) if output == RAW[0] and len(gains) == 2 and times == -1 else path
+                raise InputError(
+                    f"{which}: rate_deg_per_s {words}: {output} changes {gain / np.median(others):.4g} times as much with it as"
+                    f" {'with that of the other records' if output == RAW[0] else 'it should'}. Multiply the column by {times:.6g}."
+                )
 
 
 def _read_run(record: Record, output: str, column: str) -> tuple[BellRun, int]:

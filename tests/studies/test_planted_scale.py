@@ -26,7 +26,7 @@ from studies.papers.bvg import (
     reproduce_bell,
     simulate_runs,
 )
-from studies.record import read_record
+from studies.record import Record, read_record, write_record
 from studies.results.page import make_blocks
 from tests.compiled import compile_c
 
@@ -416,3 +416,29 @@ def test_limits_the_inverse_of_a_law_gives_its_rate_back(form, s):
     curve = RateCurve(np.array([0.3, 1.02, s]), np.zeros((3, 3)), -300.0, 300.0, form)
     rate = np.array([-250.0, -20.0, 10.0, 299.0])
     np.testing.assert_allclose(curve.value(curve.inverse(rate)), rate, rtol=1e-12)
+
+
+@pytest.mark.parametrize("output", ["output_counts", "measured_rate_deg_per_s"])
+@pytest.mark.parametrize(
+    ("k", "times", "said"),
+    [
+        (0, -1.0, "rate_deg_per_s has the opposite sign: {} changes -"),
+        (2, np.pi / 180, "rate_deg_per_s is in rad/s: {} changes 57."),
+        (2, 3600.0, "Multiply the column by 0.000277778."),
+    ],
+)
+def test_an_applied_rate_of_another_sign_or_unit_is_named(tmp_path, refuse, k, times, said, output):
+    """Each was fitted as a scale over temperature of −1, 0.017 or 3600."""
+    time = 0.5 * np.arange(800)
+    warm = 25.0 + 40.0 * np.sin(time / 60)
+    runs = [(np.repeat([0.0, -200, -50, 50, 200], 160), 25.0 + 0 * time), (0 * time, warm), (0 * time + 250, warm)]
+    paths, noise = [], np.random.default_rng(1)
+    for j, (rate, T) in enumerate(runs):
+        read = rate * (1 + 1e-4 * (T - 25)) + 0.01 * T + 0.05 * noise.standard_normal(time.size)
+        read = read if output != "output_counts" else -690 + 40 * read
+        columns = {"time_s": time, "housing_temperature_degC": T, "rate_deg_per_s": rate * (times if j == k else 1.0)}
+        paths.append(tmp_path / f"run{j}.csv")
+        write_record(Record(columns | {output: read}), paths[-1])
+    error = refuse(["fit", "scale", *map(str, paths)])
+    assert f"run{k}.csv" in error
+    assert said.format(output) in error
