@@ -86,6 +86,22 @@ def ask(capsys):
 
 
 @pytest.fixture
+def hear(capsys, monkeypatch):
+    """The JSON object of a command and the text that it prints, as one line, both of one run."""
+    from studies.cli import main, output
+
+    show, kept = output.print_result, []
+    monkeypatch.setattr(output, "print_result", lambda result: (kept.append(result), show(result)))
+
+    def answer(words):
+        capsys.readouterr()
+        assert main([*map(str, words)]) == 0
+        return json.loads(output.dump_json(kept[-1].payload)), " ".join(capsys.readouterr().out.split())
+
+    return answer
+
+
+@pytest.fixture
 def refuse(capsys):
     """What a command says that cannot work: exit status 2, nothing on stdout, nothing like a fault of the program."""
     from studies.cli import main

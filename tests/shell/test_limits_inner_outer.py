@@ -1,5 +1,6 @@
 """The inner face is the one towards the axis, whichever way the meridian is drawn."""
 
+from functools import cache
 from math import pi
 
 import numpy as np
@@ -28,6 +29,7 @@ UP, DOWN = (meridian([Line((R, a), (R, b))], H) for a, b in ((0.0, L), (0.0, -L)
 TUBES = pytest.mark.parametrize("tube", [cylinder(R, H, L), UP, DOWN], ids=["cylinder", "up", "down"])
 
 
+@cache
 def solved(resonator):
     (mode,) = solve_modes(resonator, SILICA, 2, tolerance=1e-8)
     return mode

@@ -31,7 +31,7 @@ def _run(times, levels, random):
 
 @pytest.mark.slow
 def test_a_heat_path_of_another_form_is_fitted_as_well_as_it_can_be_and_the_misfit_is_said():
-    random, card = np.random.default_rng(1), load_card("hrg-30mm")
+    random, card = np.random.default_rng(1), load_card("hrg-30mm").with_values({"thermal.cells": 10})
     runs = [_run((0, 900, 1800), (20, 20, 0), random), _run((0, 900, 2100), (20, 20, 45), random)]
     exact = [value.name for value in card.uncertain if not value.name.startswith(OPEN)]
     found = calibrate(card, runs, exact=exact, profile=False)

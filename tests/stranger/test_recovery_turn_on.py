@@ -27,7 +27,11 @@ def _run(offset, random):
 def test_what_a_card_states_of_its_turn_ons_is_no_contradiction():
     """Runs that scatter as stated are of one device; one that lies sixteen times as far is asked about, card or no card."""
     random, offsets = np.random.default_rng(5), (-0.4, 0.2, 0.6)
-    exact = {"bias.damping_anisotropy": {"value": 0.01, "sd": 0.0}, "noise.bias_turn_on_deg_per_h": 0.5}
+    exact = {
+        "thermal.cells": 10,
+        "bias.damping_anisotropy": {"value": 0.01, "sd": 0.0},
+        "noise.bias_turn_on_deg_per_h": 0.5,
+    }
     card = load_card("hrg-30mm").with_values(exact)
     runs = [_run(offset, random) for offset in offsets]
     found = calibrate(card, runs, profile=False)

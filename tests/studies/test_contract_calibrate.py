@@ -25,11 +25,10 @@ def test_what_has_not_converged_is_no_card(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-def test_tables_are_for_people(tmp_path, capsys, ask):
-    """The residual is that of `hrg diagnose`: the level is a value of the card; a scatter of rows is no Allan deviation."""
-    page = tmp_path / "page.html"
-    assert main(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv", "--report", str(page)]) == 0
-    out = capsys.readouterr().out
+def test_tables_are_for_people_and_a_saved_card_keeps_what_was_found_of_intervals(tmp_path, capsys, ask, hear, refuse):
+    """The residual is that of `hrg diagnose`, a scatter of rows no Allan deviation; intervals need not be symmetric, as value ± sd is."""
+    page, card, table = tmp_path / "page.html", tmp_path / "calibrated.toml", "studies/papers/hrg_table1.csv"
+    found, out = hear(["calibrate", "hrg-30mm", table, "--save", card, "--report", page])
     assert "Values, best known first" in out
     assert "Settled frequency" in out
     text = page.read_text(encoding="utf-8")
@@ -37,17 +36,8 @@ def test_tables_are_for_people(tmp_path, capsys, ask):
     assert "Allan" not in text
     assert "block averages" not in text
     assert "Values that the data do not depend on <small>(21 rows)" in text
-    left = ask(["diagnose", "studies/papers/hrg_table1.csv", "--card", "hrg-30mm"])["responses"]["frequency_Hz"][
-        "shipped_rms"
-    ]
+    left = ask(["diagnose", table, "--card", "hrg-30mm"])["responses"]["frequency_Hz"]["shipped_rms"]
     assert f"{1e3 * left:.0f} mHz as given" in text
-
-
-@pytest.mark.slow
-def test_a_saved_card_keeps_what_was_found_of_intervals(tmp_path, capsys, ask, refuse):
-    """They need not be symmetric about the value, as value ± sd is."""
-    card = tmp_path / "calibrated.toml"
-    found = ask(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv", "--save", card])
     told = {one["parameter"]: one for one in found["values"]}
     kept = {one["name"]: one for one in ask(["cards", card])["values"]}
     assert {name: kept[name]["interval"] for name in told} == {name: [v["low"], v["high"]] for name, v in told.items()}

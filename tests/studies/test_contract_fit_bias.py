@@ -206,17 +206,16 @@ def test_a_gyro_without_a_frequency_is_fitted_over_its_temperature(tmp_path, ask
     np.testing.assert_allclose(found[both], expected[both], atol=1e-8, rtol=0)
 
 
-def test_a_short_run_is_fitted_without_an_allan_deviation(tmp_path, capsys, ask):
+def test_a_short_run_is_fitted_without_an_allan_deviation(tmp_path, hear):
     """Twenty-five rows are enough for a law of first order; what they cannot give is left out, and said."""
     rng, time = np.random.default_rng(3), np.arange(25) * 100.0
     f = 4430 + 3 * time / time[-1]
     bias = 2 + 5 * (f - 4430) + 0.1 * rng.normal(size=25)
     write_record(Record({"time_s": time, "frequency_Hz": f, "bias_deg_per_h": bias}), tmp_path / "r.csv")
-    payload = ask(["fit", "bias", str(tmp_path / "r.csv")])
+    payload, said = hear(["fit", "bias", tmp_path / "r.csv", "--report", tmp_path / "p.html"])
     assert payload["allan"] is None
     assert payload["methods"]["guarded"]["coefficients"][1] == pytest.approx(5, abs=0.5)
-    assert main(["fit", "bias", str(tmp_path / "r.csv"), "--report", str(tmp_path / "p.html")]) == 0
-    assert "The data are short: 2" in capsys.readouterr().out
+    assert "The data are short: 2" in said
 
 
 def test_a_rate_output_is_fitted_in_its_own_unit(tmp_path, capsys):

@@ -205,6 +205,8 @@ def test_a_number_far_more_uncertain_than_itself_is_cut_off_at_0():
         ("effect.0.drift_1", "1"),
         ("effect.0.loop_1_per_K", "1/K"),
         ("electrodes.resistance_ohm", "Ω"),
+        ("bias_trend_deg_per_h_per_year", "°/h/year"),
+        ("inverse_q_trend_per_year", "1/year"),
         ("electrodes.gap_wave.0.amplitude_percent", "%"),
     ],
 )

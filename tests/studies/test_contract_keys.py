@@ -20,7 +20,6 @@ from studies.errors import InputError
 from studies.importing.mapping import ImportMap
 from studies.instrument.material_file import MaterialFile, PropertyKeys
 from studies.instrument.registry import card_tables
-from studies.instrument.units import unit_of
 from studies.models.file import ModelKeys
 from studies.schema.keys import describe, number_in, options, structs
 from studies.schema.reader import read_keys
@@ -185,8 +184,3 @@ def test_every_material_that_ships_has_the_keys_that_are_told_and_no_others():
                 read_keys({"schema": schema, "NAME": entry | {"laws": laws}}, MaterialFile, name)
     numbers = {"at_degC", *(key for _, needed in FORMS.values() for key in needed)}
     assert set(PropertyKeys.__struct_fields__) == numbers | {"form", "uncertainty", "unsettled", "source"}
-
-
-def test_limits_per_year_have_that_unit():
-    assert unit_of("bias_trend_deg_per_h_per_year") == "°/h/year"
-    assert unit_of("inverse_q_trend_per_year") == "1/year"

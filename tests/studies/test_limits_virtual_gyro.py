@@ -164,16 +164,6 @@ def test_a_measured_profile_of_many_rows_is_the_same_as_its_corners(card, law, t
     assert many["resonator_temperature_degC"] == pytest.approx(few["resonator_temperature_degC"], abs=1e-5)
 
 
-def test_an_effect_of_the_card_is_added(card, law):
-    lagging = card.with_table("effect", [{"name": "second-lag", "weight": 0.2, "second_time_constant_s": 20000.0}])
-    plain, slow = (run(c, law, noise=False).record for c in (card, lagging))
-    assert slow["frequency_Hz"][9000] > plain["frequency_Hz"][9000] + 0.05
-    jump = [{"name": "rate-bias", "coefficient_deg_per_h_per_K_per_s": 100.0}]
-    rated = run(card.with_table("effect", jump), law, noise=False).record
-    rate = np.gradient(plain["resonator_temperature_degC"])
-    assert rated["bias_deg_per_h"] - plain["bias_deg_per_h"] == pytest.approx(100 * rate, abs=2e-3)
-
-
 def test_an_ageing_with_a_date_goes_on_from_it(card, law, tmp_path):
     """Once every run began as new: a leak was wrong by 89 times the noise three days later."""
     aged = card.with_table("effect", [{"name": "clock-drift", "drift_Hz_per_day": 0.5, "since": "2026-03-01T12:00:00"}])

@@ -223,11 +223,11 @@ def law_only(device, records, **changed):
     return calibrate(device, bare, exact=fixed, profile=False)
 
 
-SWINGS = (*("cycle 20 -10 35 1 40min 1", "cycle 20 35 -10 1 40min 1") * 2,)
+SWINGS = ("cycle 20 -10 35 1 40min 1", "cycle 20 35 -10 1 40min 1", "cycle 20 -10 35 1 40min 1")
 
 
 def calibrated_with_levels(card, seed, *spreads):
-    """A device whose law alone is unknown; of each spread the levels of a further run and four (Hz), and the card from those four.
+    """A device whose law alone is unknown; of each spread the levels of a further run and three (Hz), and the card from those three.
 
     The shell is one cell: levels have nothing to do with how heat goes through it.
     """

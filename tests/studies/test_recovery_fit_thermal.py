@@ -77,7 +77,7 @@ def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, ask):
 
 
 @pytest.mark.slow
-def test_a_cubic_law_is_no_heat_path_and_a_law_beyond_it_no_negative_radiation(tmp_path, capsys, ask):
+def test_a_cubic_law_is_no_heat_path_and_a_law_beyond_it_no_negative_radiation(tmp_path, hear):
     """The cubic of the HRG paper behind one lag (it made a lag of 2 s and a negative share); a quartic that no cubic follows is a misfit."""
     found = fit_thermal_constants([one_lag(higher=(1.5e-5, 0.0))]).estimates
     assert "time_constant_2" not in found
@@ -85,15 +85,15 @@ def test_a_cubic_law_is_no_heat_path_and_a_law_beyond_it_no_negative_radiation(t
         half = 0.5 * (found[name].high - found[name].low)
         assert abs(found[name].value - planted) < 3 * half
     write_record(one_lag(higher=(1.5e-5, 1e-7)), tmp_path / "run.csv")
-    share = ask(["fit", "thermal", tmp_path / "run.csv", "--lags", "1"])["estimates"]["radiated_share"]
+    answer, said = hear(["fit", "thermal", tmp_path / "run.csv", "--lags", "1"])
+    share = answer["estimates"]["radiated_share"]
     assert share["value"] is None
     assert share["high"] < 0.0
-    assert main(["fit", "thermal", str(tmp_path / "run.csv"), "--lags", "1"]) == 0
-    assert "comes out below zero" in " ".join(capsys.readouterr().out.split())
+    assert "comes out below zero" in said
 
 
 @pytest.mark.slow
-def test_rows_far_apart_find_the_lag_of_a_smooth_housing_and_whose_noise_is_left(tmp_path, capsys, ask):
+def test_rows_far_apart_find_the_lag_of_a_smooth_housing_and_whose_noise_is_left(tmp_path, hear):
     """Closed form: a housing with 900 s behind a step, a resonator with 1200 s behind it, rows of 60 s, 3 mK of noise in the thermometer.
 
     Straight lines between the rows were told as a sensor that is 0.4 s late, and as a slope 3.5 standard deviations off.
@@ -107,13 +107,13 @@ def test_rows_far_apart_find_the_lag_of_a_smooth_housing_and_whose_noise_is_left
         columns["frequency_Hz"] = 4432.0 * (1 + 8e-5 * x + 5e-8 * x**2) + 2e-5 * rng.normal(size=t.size)
         runs.append(str(tmp_path / f"run{k}.csv"))
         write_record(Record(columns), runs[-1])
-    found = ask(["fit", "thermal", *runs, "--confidence", "0.95"])["estimates"]
+    answer, said = hear(["fit", "thermal", *runs, "--confidence", "0.95"])
+    found = answer["estimates"]
     assert not {"delay", "sensor_lag"} & set(found)
     tau, slope = found["time_constant_1"], found["slope"]
     assert tau["low"] < 1200.0 < tau["high"]
     assert slope["low"] < 4432.0 * (8e-5 + 2 * 5e-8 * (5.0 - 20.0)) < slope["high"]
-    assert main(["fit", "thermal", *runs]) == 0
-    assert "noise of the housing's readings alone makes" in " ".join(capsys.readouterr().out.split())
+    assert "noise of the housing's readings alone makes" in said
 
 
 @pytest.mark.slow
@@ -155,8 +155,8 @@ def test_two_lags_in_series_are_found_and_a_second_is_not_made_up():
 @pytest.mark.usefixtures("fine")
 @pytest.mark.parametrize(
     ("taus", "past", "late"),
-    [((1500.0,), False, 0.0), ((1500.0, 400.0), True, 0.0), ((1500.0, 400.0), True, 60.0)],
-    ids=["one lump", "past the lump between", "behind a late sensor"],
+    [((1500.0,), False, 0.0), ((1500.0, 400.0), True, 60.0)],
+    ids=["one lump", "past the lump between, behind a late sensor"],
 )
 def test_the_radiated_share_of_lumps_is_found(taus, past, late):
     """Lumps in a row with 40 % of their conductance by radiation at 20 °C over 100 K, by the implicit integrator.

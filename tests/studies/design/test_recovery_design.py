@@ -28,17 +28,23 @@ def ask(posed):
     return answer(task, explorer, Row)
 
 
+def least_sum(pose, *limits, box=XY, product=lambda d: d[0] * d[1], **tables):
+    """Pose the least x + y within limits of a product, ½ or more."""
+    limits = limits or ({"column": "product", "low": 0.5},)
+    objective = [{"column": "sum"}]
+    return pose(
+        box,
+        ["sum", "product"],
+        lambda d: [d[0] + d[1], product(d)],
+        objective=objective,
+        constraint=[*limits],
+        **tables,
+    )
+
+
 def test_the_least_sum_at_a_given_product_and_its_price(pose):
     # min x + y with x y ≥ 1/2: x = y = 1/√2, and d(x + y)/d(limit) = 1/√(limit)
-    found = ask(
-        pose(
-            XY,
-            ["sum", "product"],
-            lambda d: [d[0] + d[1], d[0] * d[1]],
-            objective=[{"column": "sum"}],
-            constraint=[{"column": "product", "low": 0.5}],
-        )
-    )
+    found = ask(least_sum(pose))
     assert found.best == pytest.approx([0.5**0.5] * 2, abs=2e-3)
     assert found.after[0] == pytest.approx(2**0.5, rel=1e-5)
     assert found.limits[0].price == pytest.approx(2**0.5, rel=1e-2)
@@ -56,15 +62,7 @@ def test_a_target_and_a_bound(pose):
 
 def test_whole_steps_keep_the_limits(pose):
     stepped = {"x": (0.1, 2.0, {"step": 0.05}), "y": (0.1, 2.0, {"step": 0.07})}
-    found = ask(
-        pose(
-            stepped,
-            ["sum", "product"],
-            lambda d: [d[0] + d[1], d[0] * d[1]],
-            objective=[{"column": "sum"}],
-            constraint=[{"column": "product", "low": 0.5}],
-        )
-    )
+    found = ask(least_sum(pose, box=stepped))
     grid = [(0.05 * i, 0.07 * j) for i in range(2, 41) for j in range(2, 29) if 0.05 * i * 0.07 * j >= 0.5]
     assert found.best / [0.05, 0.07] == pytest.approx(np.round(found.best / [0.05, 0.07]), abs=1e-9)
     assert found.after[1] >= 0.5
@@ -74,15 +72,8 @@ def test_whole_steps_keep_the_limits(pose):
 @pytest.mark.parametrize("limits", [{"low": 0.5}, {"low": 0.5, "high": 0.51}])
 def test_what_has_no_step_follows_the_whole_steps(pose, limits):
     # x in steps of 0.4, y at will: of 0.5/x + x the step 0.8 is best, where the smooth optimum's y = 0.71 is none, or not allowed
-    found = ask(
-        pose(
-            {"x": (0.1, 2.0, {"step": 0.4}), "y": (0.1, 2.0, {})},
-            ["sum", "product"],
-            lambda d: [d[0] + d[1], d[0] * d[1]],
-            objective=[{"column": "sum"}],
-            constraint=[{"column": "product", **limits}],
-        )
-    )
+    box = {"x": (0.1, 2.0, {"step": 0.4}), "y": (0.1, 2.0, {})}
+    found = ask(least_sum(pose, {"column": "product", **limits}, box=box))
     assert found.best == pytest.approx([0.8, 0.625], abs=1e-5)
     assert found.after[1] >= 0.5 * (1 - 1e-6)
 
@@ -106,17 +97,9 @@ def test_the_front_of_two_parabolas(pose):
 
 def test_worst_case_margins_are_those_of_the_slopes(pose):
     # x y ≥ 1/2 for x off by 0.02 and a factor, not free, off by 0.01: (x - 0.02) y (1 - 0.01) = 1/2 to first order
-    found = ask(
-        pose(
-            XY,
-            ["sum", "product"],
-            lambda d: [d[0] + d[1], d[0] * d[1] * d[2]],
-            objective=[{"column": "sum"}],
-            constraint=[{"column": "product", "low": 0.5}],
-            tolerance=[{"name": "x", "tolerance": 0.02}, {"name": "factor", "tolerance": 0.01}],
-            margin={"kind": "worst-case"},
-        )
-    )
+    tolerance = [{"name": "x", "tolerance": 0.02}, {"name": "factor", "tolerance": 0.01}]
+    asked = {"tolerance": tolerance, "margin": {"kind": "worst-case"}}
+    found = ask(least_sum(pose, product=lambda d: d[0] * d[1] * d[2], **asked))
     x, y, _ = found.best
     assert x * y - 0.02 * y - 0.01 * x * y == pytest.approx(0.5, abs=1e-4)
     (spread,) = [one for one in found.spreads if one.column == "product"]
@@ -152,13 +135,7 @@ def test_an_objective_that_changes_in_steps_has_no_gradient(pose):
 
 @pytest.mark.slow
 def test_limits_that_contradict_are_named_with_what_lacks(pose):
-    posed = pose(
-        XY,
-        ["sum", "product"],
-        lambda d: [d[0] + d[1], d[0] * d[1]],
-        objective=[{"column": "sum"}],
-        constraint=[{"column": "product", "low": 1.0}, {"column": "sum", "high": 1.5}],
-    )
+    posed = least_sum(pose, {"column": "product", "low": 1.0}, {"column": "sum", "high": 1.5})
     with pytest.raises(
         InputError, match=r"no design found meets all constraints.*product = .* below its limit 1; sum = "
     ):

@@ -70,7 +70,7 @@ def test_a_set_point_that_the_air_follows_late_is_no_second_lag(shipped, only):
 
 def test_what_a_loss_peak_does_to_the_bias_is_no_second_cause(only):
     """Anisotropy of damping makes bias of 1/Q (Lynch 1995): a peak of the one was once named cross-damping in the other too."""
-    card = load_card("cvg-25mm")
+    card = load_card("cvg-25mm").with_values({"thermal.cells": 10})
     peak = {"name": "loss-peak", "response": "inverse_q", "temperature_degC": 8.0, "width_K": 6.0, "peak_1": 1e-6}
     only("loss-peak", "cross-damping", "activity-dip", "mounting-stress")
     runs = simulated(card.with_table("effect", [peak]), *PROFILES)
@@ -96,7 +96,7 @@ def test_an_effect_is_not_taken_for_values_far_from_the_card(only):
 
 def test_what_leads_in_straight_lines_is_not_taken_before_its_rivals_are_followed(only):
     """A gradient's dT/dt of a device far from its card, its housing not measured: two values of the card were named, and the rest was unexplained."""
-    card = load_card("cvg-25mm")
+    card = load_card("cvg-25mm").with_values({"thermal.cells": 10})
     own = {"mount_conductance_W_per_K": 0.2, "film_emissivity": 0.34, "chamber_conductance_W_per_K": 0.055}
     slope = {"name": "rate-frequency", "response": "frequency_Hz", "coefficient_Hz_per_K_per_s": -100.0}
     only("rate-frequency", "mounting-stress", "second-lag", "thermometer-scale")
@@ -145,7 +145,7 @@ def driven(card, seed=0):
 
 def test_a_strong_effect_leaves_the_values_alone(only):
     """Beside an amplitude-frequency effect of a hundred times the noise, priors of the first fit's scale let three values go far."""
-    card = load_card("bvg-bell")
+    card = load_card("bvg-bell").with_values({"thermal.cells": 10})
     only("amplitude-frequency", "mounting-stress", "second-lag", "thermometer-scale")
     verdict = diagnose_records(driven(card), card).verdict
     assert [(cause.kind, cause.effect) for cause in verdict.causes] == [("physics", "amplitude-frequency")]
@@ -154,7 +154,7 @@ def test_a_strong_effect_leaves_the_values_alone(only):
 
 def test_bursts_of_outliers_beside_an_effect_are_no_jump(only):
     """What stood out was settled before the effect was known: bursts that hid beside it were then named as jumps and dips."""
-    card = load_card("bvg-bell")
+    card = load_card("bvg-bell").with_values({"thermal.cells": 10})
     only("amplitude-frequency", "jump", "activity-dip", "ageing")
     rng, runs = np.random.default_rng(2), []
     for run in driven(card, 2):
@@ -223,7 +223,7 @@ def test_what_has_not_converged_is_no_card(shipped, tmp_path, capsys, monkeypatc
 
 def test_slow_noise_of_a_loss_of_which_the_card_states_none_is_noise():
     """A card has no key for it: a walk of 1/Q of three times its white noise left a healthy gyro unexplained."""
-    card, random = load_card("hrg-30mm"), np.random.default_rng(1)
+    card, random = load_card("hrg-30mm").with_values({"thermal.cells": 10}), np.random.default_rng(1)
     records = []
     for k, words in enumerate(("staircase 20 -10 15 75min", "soak 20 12h")):
         record = simulate_run(card, load_profile(words), 1 / 60, 10 + k).record

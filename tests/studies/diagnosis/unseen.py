@@ -34,7 +34,12 @@ CARD_SAYS = {
 }
 """The bias follows the temperature, without a second cause; offsets of turn-on of a tenth of the noise, beside which a drift of the bias
 from run to run is told."""
-COMMANDED = {"amplitude_squared": (1.0, 1.2, 0.8, 1.1)}
+COMMANDED = {
+    "amplitude_squared": (1.0, 1.2, 0.8, 1.1),
+    "voltage_squared": (80.0, 100.0, 60.0, 90.0),
+    "quadrature": (0.5, 1.5, -0.5, 1.0),
+    "pattern_angle": (0.0, 15.0, 30.0, 40.0),
+}
 """Levels of a commanded drive, in the unit of its column."""
 CASES = (
     ("self-heating", F, {"heating_K_per_V2": 1.0}),

@@ -24,6 +24,7 @@ from studies.instrument.card import load_card
 from studies.simulation.chamber import load_profile
 from studies.simulation.prediction import predict
 from studies.simulation.virtual_gyro import simulate_run
+from tests.sketches import coarsen
 from tests.studies.diagnosis.unseen import COMMANDED, run_drive
 
 CARD = "hrg-30mm"
@@ -193,6 +194,7 @@ def test_a_block_whose_gaps_leave_no_row_for_the_fit_is_not_held_out(search):
 @pytest.mark.slow
 def test_a_search_whose_effects_fall_away_ends_where_the_values_are_likeliest_without_them(monkeypatch):
     """It once ended where it was linearised beside them: 24 to 49 mHz were left of 2, and called noise."""
+    coarsen(monkeypatch, 60)
     made = [simulate_run(load_card(CARD), load_profile(words), 1 / 60, k).record for k, words in enumerate(RUNS)]
     records = [replace(one, path=f"run{k}.csv") for k, one in enumerate(made)]
     found = fit(build_problem(polynomial_card(records), records))

@@ -158,15 +158,10 @@ def test_a_limit_nearer_than_the_own_error_of_a_theory_is_told():
 
 def test_worst_case(tmp_path, functions):
     functions.write_text("def bowl(i, p):\n    return (p['user.x'] - 0.3) ** 2 + (p['user.y'] + 0.2) ** 2\n")
-    spec = {
-        "card": "hrg-30mm",
-        "sampling": {"method": "grid"},
-        "parameter": [{**p, "count": 2} for p in box("x", "y", low=-1, high=1)],
-        "quantity": [{"name": "python", "function": f"{functions}:bowl"}],
-        "search": [{"kind": "worst-case", "column": "bowl"}],
-    }
-    spec["parameter"].append({"name": "user.z", "values": [0.7], "nominal": 0.7})  # does not vary
-    results = run_study(spec, workers=1, allow_python=True)
+    still = {"name": "user.z", "values": [0.7], "nominal": 0.7}  # does not vary
+    parameters = [*({**p, "count": 2} for p in box("x", "y", low=-1, high=1)), still]
+    search = [{"kind": "worst-case", "column": "bowl"}]
+    results = study(tmp_path, "bowl", {"method": "grid"}, *parameters, search=search)
     worst = results.store.findings[name_search(results.study.searches[0])]
     assert worst["least"]["value"] == pytest.approx(0, abs=1e-4)  # inside the box, where no corner is
     assert worst["greatest"]["value"] == pytest.approx(1.3**2 + 1.2**2, rel=1e-12)
@@ -178,15 +173,10 @@ def test_tolerances_that_a_share_keeps(tmp_path, functions):
     """The size of two independent normal parts is distributed as Rayleigh's law: 95 % lie below σ √(2 ln 20)."""
     functions.write_text("def size(i, p):\n    return 2 * (p['user.x'] ** 2 + p['user.y'] ** 2) ** 0.5\n")
     normal = {"nominal": 0.0, "distribution": "normal", "standard_deviation": 3.0}
-    spec = {
-        "card": "hrg-30mm",
-        "sampling": {"method": "latin-hypercube", "cases": 400, "seed": 3},
-        "parameter": [{"name": "user.x", **normal}, {"name": "user.y", **normal}],
-        "quantity": [{"name": "python", "function": f"{functions}:size"}],
-        "requirement": [{"column": "size", "high": 0.5}],
-        "search": [{"kind": "tolerance", "share": 0.95}],
-    }
-    (found,) = run_study(spec, workers=1, allow_python=True).store.findings.values()
+    sampling = {"method": "latin-hypercube", "cases": 400, "seed": 3}
+    asked = {"requirement": [{"column": "size", "high": 0.5}], "search": [{"kind": "tolerance", "share": 0.95}]}
+    results = study(tmp_path, "size", sampling, *({"name": f"user.{k}", **normal} for k in "xy"), **asked)
+    (found,) = results.store.findings.values()
     deviation = 0.25 / math.sqrt(2 * math.log(20))
     assert found["low"] < deviation / 3 < found["high"]
     assert found["factor"] == pytest.approx(deviation / 3, rel=0.05)

@@ -65,3 +65,8 @@ def simulated(instrument, profile, row=1.0):
 def worst(found, expected):
     """The largest difference of a column, over the largest value of the column."""
     return {name: float(np.abs(found[name] - v).max() / np.abs(v).max()) for name, v in expected.items() if np.any(v)}
+
+
+def off(found, expected, within=1e-9):
+    """The columns that differ by more, with what `worst` says of them."""
+    return {name: error for name, error in worst(found, expected).items() if error > within}

@@ -38,6 +38,13 @@ def simulate_fmpy(path, start, *more):
     return fmpy.simulate_fmu(str(path), validate=True, fmi_type="CoSimulation", **options), text
 
 
+def driven(rate=0.0):
+    """What the FMU is given, as the drive of a simulation, at a rate in °/s."""
+    profile = Profile(TIME, LEVEL + 273.15)
+    drive = drive_by_profile(profile, rows_of(profile, 1.0))
+    return replace(drive, rate=np.full(drive.time.size, np.radians(rate))) if rate else drive
+
+
 @needs_compiler
 @pytest.mark.slow
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
@@ -49,9 +56,7 @@ def test_limits_fmu_in_fmpy(version, tmp_path):
     moved = {"thermal.mount_conductance_W_per_K": 0.02, "bias.damping_anisotropy": 0.02}
     found, text = simulate_fmpy(path, {"noise": False, **moved})
     instrument = load_card("hrg-30mm-loops").with_values(moved)
-    profile = Profile(TIME, LEVEL + 273.15)
-    drive = drive_by_profile(profile, rows_of(profile, 1.0))
-    drive = type(drive)(drive.time, "chamber", profile, rate=np.full(drive.time.size, np.radians(0.01)))
+    drive = driven(0.01)
     run = simulate_run(instrument, drive, noise=False)
     expected = dict(run.prediction.columns) | {"housing_temperature_degC": run.prediction.housing - 273.15}
     assert found["time"].size == drive.time.size
@@ -155,9 +160,7 @@ def test_limits_turning_wave_in_fmpy(tmp_path):
     fmus.write_fmu(plan, path, "3.0")
     start = {"noise": False, "loop.drive_gain_ratio": -0.02, "commanded_precession_deg_per_s": 0.3}
     found, _ = simulate_fmpy(path, start, "pattern_angle_deg")
-    profile = Profile(TIME, LEVEL + 273.15)
-    drive = drive_by_profile(profile, rows_of(profile, 1.0))
-    drive = type(drive)(drive.time, "chamber", profile, rate=np.full(drive.time.size, np.radians(0.01)))
+    drive = driven(0.01)
     moved = {"loop.drive_gain_ratio": -0.02, "loop.self_precession_deg_per_s": 0.3}
     expected = simulate_run(instrument.with_values(moved), drive, noise=False).prediction.columns
     assert np.abs(found["pattern_angle_deg"] - expected["pattern_angle_deg"]).max() < 1e-9 * 1620
@@ -173,8 +176,7 @@ def test_limits_fmu_of_a_card_that_ages(tmp_path):
     drift = {"name": "clock-drift", "drift_Hz_per_day": 0.5, "since": since}
     instrument = load_card("free-dome").with_table("effect", [drift])
     fmus.write_fmu(plan_twin(instrument), path, "3.0")
-    profile = Profile(TIME, LEVEL + 273.15)
-    drive = drive_by_profile(profile, rows_of(profile, 1.0))
+    drive = driven()
     for start, moved in (({}, 0.0), ({"start_s": moment}, 2.0)):
         found, text = simulate_fmpy(path, {"noise": False, **start})
         run = simulate_run(instrument, replace(drive, moment=start.get("start_s")), noise=False)

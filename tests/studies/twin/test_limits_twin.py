@@ -20,6 +20,7 @@ from tests.studies.twin.building import (
     SANITIZED,
     compile_twin,
     needs_compiler,
+    off,
     run_twin,
     simulated,
     worst,
@@ -67,7 +68,7 @@ def test_limits_shipped_card_over_ten_hours(card, folder):
     chamber = Profile(np.array(TEN_HOURS["time_s"]), 273.15 + np.array(TEN_HOURS["chamber_temperature_degC"]))
     expected = simulated(instrument, chamber, 12.0)
     assert set(expected) < set(found)
-    assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
+    assert off(found, expected) == {}
 
 
 def one_effect(name, response):
@@ -145,9 +146,8 @@ def test_limits_effect(effects, bare, folder):
     card, profile = load_card("free-dome"), folder / "ramps.csv"
     instrument = card.with_table("effect", [one_effect(*one) for one in effects])
     found = run_twin(compile_twin(instrument, folder / "effect"), profile, 4.0)
-    errors = worst(found, simulated(instrument, profile, 4.0))
     allowed = max(BY_DIFFERENCES.get(name, 1e-9) for name, _ in effects)
-    assert {column: error for column, error in errors.items() if error > allowed} == {}
+    assert off(found, simulated(instrument, profile, 4.0), allowed) == {}
     for name, response in effects:
         alone = simulated(card.with_table("effect", [one_effect(name, response)]), profile, 20.0)
         columns = bare if library()[name].thermal else (response,)
@@ -174,7 +174,7 @@ def test_limits_wave_that_turns_freely(precession, control, folder):
         found, expected = run_twin(program, profile, row), simulated(instrument, profile, row)
         assert np.ptp(expected["pattern_angle_deg"]) > 0.9 * abs(precession) * columns["time_s"][-1]
         assert np.ptp(expected["pattern_angle_deg"]) > 0.3
-        assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
+        assert off(found, expected) == {}
     held = write_profile(folder / "held.csv", TEN_HOURS | {"pattern_angle_deg": [0.0] * 5})
     done = subprocess.run([program, held, folder / "no.csv"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
@@ -221,7 +221,7 @@ def test_limits_everything_at_once(folder):
         instrument = instrument.with_table("thermal", {"radiation": radiates, **heat})
         found = run_twin(compile_twin(instrument, folder / control), profile, 2.0)
         expected = simulated(instrument, profile, 2.0)
-        assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}, control
+        assert off(found, expected) == {}, control
 
 
 @pytest.mark.slow
@@ -234,7 +234,7 @@ def test_limits_imperfect_card(cells, folder):
     )
     found = run_twin(compile_twin(instrument, folder / "busy"), profile, 10.0)
     expected = simulated(instrument, profile, 10.0)
-    assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
+    assert off(found, expected) == {}
 
 
 LAW = """
@@ -280,8 +280,7 @@ def test_limits_card_without_a_geometry(delay, direct, folder):
     chamber = Profile(np.array(TEN_HOURS["time_s"]), 273.15 + np.array(TEN_HOURS["chamber_temperature_degC"]))
     expected = simulated(instrument, chamber, 3.0)
     known = found["time_s"] <= TEN_HOURS["time_s"][-1] + min(delay, 0.0)
-    errors = worst({k: v[known] for k, v in found.items()}, {k: v[known] for k, v in expected.items()})
-    assert {name: error for name, error in errors.items() if error > 1e-9} == {}
+    assert off({k: v[known] for k, v in found.items()}, {k: v[known] for k, v in expected.items()}) == {}
     assert not [key for key in instrument_keys(instrument) if key.startswith(("thermal.", "law."))]
 
 
@@ -299,7 +298,7 @@ def test_limits_imposed_housing(folder):
     profile = write_profile(folder / "housing.csv", columns)
     found = run_twin(compile_twin(instrument, folder / "housing", boundary="housing"), profile, 120.0)
     expected = simulated(instrument, profile)
-    assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
+    assert off(found, expected) == {}
 
 
 @pytest.mark.slow
