@@ -10,7 +10,7 @@ S the mode's own sensitivity to the thickness along the meridian (the second ter
 mean of h³ and the mean of h⁻³). Both are part of the error that is stated.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -36,12 +36,17 @@ class Rest:
     weight: Array
     relative: Array
 
+    @property
+    def squares(self) -> float:
+        """<(δ/h)²>."""
+        return float(self.weight @ self.relative**2)
+
     def error(self, along: AlongMeridian) -> float:
         """Relative error of a mode's frequency by leaving it out."""
         wide = along.width > 0
         density = along.thickness[wide] / along.width[wide]
         first = np.interp(self.position, along.position[wide], density) @ (self.weight * self.relative)
-        return abs(float(first)) + SECOND_ORDER * float(self.weight @ self.relative**2)
+        return abs(float(first)) + SECOND_ORDER * self.squares
 
 
 @lru_cache(maxsize=64)
@@ -61,7 +66,7 @@ def fit_profile(resonator: Resonator) -> tuple[Resonator, Rest | None]:
         knots += [(float(piece.position[0]), float(ends[0])), (float(piece.position[-1]), float(ends[1]))]
     polynomials = tuple(tuple(piece.coefficients.tolist()) for piece in pieces)
     fitted = replace(resonator, thickness=tuple(knots), pieces=polynomials)
-    rest = Rest(*(np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("at", "weight", "relative")))
+    rest = Rest(*(np.concatenate([vars(piece.rest)[f.name] for piece in pieces]) for f in fields(Rest)))
     return fitted, rest
 
 
@@ -72,13 +77,7 @@ class _Piece:
     position: Array
     value: Array
     coefficients: Array
-    at: Array
-    weight: Array
-    relative: Array
-
-    @property
-    def squares(self) -> float:
-        return float(self.weight @ self.relative**2)
+    rest: Rest
 
 
 def _fit(position: Array, value: Array) -> _Piece:
@@ -90,14 +89,15 @@ def _fit(position: Array, value: Array) -> _Piece:
     scaled = 2 * (at - position[0]) / (position[-1] - position[0]) - 1
     degree = min(DEGREE, len(position) - 1)
     coefficients = series.legfit(scaled, h, degree, w=np.sqrt(weight))
-    return _Piece(position, value, coefficients, at, weight, h / series.legval(scaled, coefficients) - 1)
+    return _Piece(position, value, coefficients, Rest(at, weight, h / series.legval(scaled, coefficients) - 1))
 
 
 def _cut(piece: _Piece) -> list[_Piece]:
     """The piece, or the pieces that describe its points much better."""
-    if piece.squares <= SMALL * piece.weight.sum() or len(piece.position) < 3:
+    rest = piece.rest
+    if rest.squares <= SMALL * rest.weight.sum() or len(piece.position) < 3:
         return [piece]
-    worst = float(piece.at[np.argmax(abs(piece.relative))])
+    worst = float(rest.position[np.argmax(abs(rest.relative))])
     inner = piece.position[1:-1]
     k = 1 + int(np.argmin(abs(inner - worst)))
     # a kink is seen where the slope jumps most; where its neighbours are smooth, that is the better place to cut
@@ -105,8 +105,8 @@ def _cut(piece: _Piece) -> list[_Piece]:
     found = []
     for at in dict.fromkeys((1 + int(np.argmax(jumps)), k, len(piece.position) // 2)):
         halves = _fit(piece.position[: at + 1], piece.value[: at + 1]), _fit(piece.position[at:], piece.value[at:])
-        found.append((sum(half.squares for half in halves), halves))
+        found.append((sum(half.rest.squares for half in halves), halves))
     left, halves = min(found, key=lambda one: one[0])
-    if left > WORTH * piece.squares:
+    if left > WORTH * rest.squares:
         return [piece]
     return [part for half in halves for part in _cut(half)]

@@ -109,12 +109,11 @@ def _cut_section(resonator: Resonator, layers: int, spacing: float) -> Pieces:
 def _divide_cells(mesh: Mesh, boundary: Support, count: int, grids: list[Array], held: list[NDArray[np.bool_]]) -> None:
     along = nodal(mesh.grid.shape[2] - 1, np.linspace(-1.0, 1.0, 2 * count + 1)).values
     fixed = mesh.outside & mesh.between(boundary.held)
-    for cell in range(len(mesh.vertices)):
-        grids.append(np.einsum("ia,gab,jb->gij", along, mesh.grid[:, cell], along))
-        marks = np.zeros((2 * count + 1, 2 * count + 1), dtype=bool)
-        for edge, side in zip(mesh.edges[cell], (marks[:, 0], marks[:, -1], marks[0], marks[-1]), strict=True):
-            side[:] = side | fixed[edge]
-        held.append(marks)
+    grids.extend(np.einsum("ia,gcab,jb->cgij", along, mesh.grid, along))
+    marks = np.zeros((len(mesh.edges), len(along), len(along)), dtype=bool)
+    for edge, side in enumerate((np.s_[:, :, 0], np.s_[:, :, -1], np.s_[:, 0], np.s_[:, -1])):
+        marks[side] |= fixed[mesh.edges[:, edge], None]
+    held.extend(marks)
 
 
 def _join(grids: list[Array], held: list[NDArray[np.bool_]]) -> Pieces:
@@ -131,11 +130,9 @@ def _join(grids: list[Array], held: list[NDArray[np.bool_]]) -> Pieces:
     np.logical_or.at(marks, numbers, np.concatenate([one.ravel() for one in held]))
     pieces, start = [], 0
     for grid in grids:
-        rows, columns = grid.shape[1:]
-        own = numbers[start : start + rows * columns].reshape(rows, columns)
-        start += own.size
-        pieces += [own[i : i + 3, j : j + 3] for i in range(0, rows - 1, 2) for j in range(0, columns - 1, 2)]
-    return Pieces(points[:, first], np.array(pieces), marks)
+        own = numbers[start : (start := start + grid[0].size)].reshape(grid.shape[1:])
+        pieces.append(np.lib.stride_tricks.sliding_window_view(own, (3, 3))[::2, ::2].reshape(-1, 3, 3))
+    return Pieces(points[:, first], np.concatenate(pieces), marks)
 
 
 def _turn(section: Pieces, around: int, size: float) -> Volume:
