@@ -47,7 +47,7 @@ class SplitPair:
         if card.split is None or card.split.harmonic != self.mode.harmonic:
             return self._sum()
         n = self.mode.harmonic
-        wave = -card.split.hertz / self.mode.frequency * np.exp(2j * n * card.split.slow_axis)
+        wave = -card.split.split_Hz / self.mode.frequency * np.exp(2j * n * np.deg2rad(card.split.slow_axis_deg))
         return Split(n, self.mode.frequency, 0.0, complex(wave))
 
     @cached_property

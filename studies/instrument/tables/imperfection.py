@@ -100,20 +100,11 @@ class ImperfectionKeys(Keys, frozen=True, kw_only=True):
 
 
 @dataclass(frozen=True)
-class MeasuredSplit:
-    """A split (Hz) of a harmonic and the azimuth (rad) of an antinode of its slower mode."""
-
-    harmonic: int
-    hertz: float
-    slow_axis: float
-
-
-@dataclass(frozen=True)
 class CardImperfection:
     """What a card says of its resonator's imperfection: fields and masses in SI units, and a measured split."""
 
     fields: "Imperfection | None"
-    split: MeasuredSplit | None
+    split: SplitKeys | None
 
 
 @dataclass(frozen=True)
@@ -128,12 +119,9 @@ class Power:
 
 
 def build(keys: ImperfectionKeys, place: CardPlace) -> CardImperfection:
-    """Return the imperfection in SI units."""
-    split = None
-    if keys.split is not None:
-        split = MeasuredSplit(keys.split.harmonic, keys.split.split_Hz, float(np.deg2rad(keys.split.slow_axis_deg)))
+    """Return the imperfection, its fields and masses in SI units."""
     if not (keys.wave or keys.mass or keys.map or keys.wall.waves):
-        return CardImperfection(None, split)
+        return CardImperfection(None, keys.split)
     from shell.imperfection import Field, Imperfection, PointMass
 
     gathered: dict[str, Any] = defaultdict(Field)
@@ -143,7 +131,7 @@ def build(keys: ImperfectionKeys, place: CardPlace) -> CardImperfection:
     for table in keys.map:
         gathered[LENGTHS[table.of]] += _map(table, place)
     masses = tuple(PointMass(1e-9 * m.mass_ug, np.deg2rad(m.azimuth_deg), m.position, m.height) for m in keys.mass)
-    return CardImperfection(Imperfection(**gathered, masses=masses), split)
+    return CardImperfection(Imperfection(**gathered, masses=masses), keys.split)
 
 
 def _wave(keys: WaveKeys) -> "Field":
