@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from shell.curves import Arc
 from shell.errors import ShellError
-from shell.imperfection.field import Complex, Field, fourier
+from shell.imperfection.field import Complex, Field, fourier, values_around
 from shell.imperfection.pair import Density
 from shell.quadrature import Array
 from shell.scan.alignment import RigidMotion
@@ -117,8 +117,7 @@ class Face:
 
     def profile(self, position: Array, azimuth: Array, first: int = 0) -> Array:
         """δ around circles, (positions, azimuths), m; of the waves from the `first` on."""
-        c, m = self.waves.along(position) @ self.coefficients.T, np.arange(first, self.waves.highest + 1)
-        return np.asarray((c[:, first:] @ np.exp(-1j * np.multiply.outer(m, azimuth))).real)
+        return values_around(self.field, range(first, self.waves.highest + 1), position, azimuth)
 
 
 def most_waves(count: int) -> int:
