@@ -111,6 +111,13 @@ def shell_gradients(section: Section, n: int, through: Orders, points: Array) ->
     return flat.reshape(*flat.shape[:2], 3, 3, *flat.shape[3:]), (A * rho)[..., 0, 0]
 
 
+def strains_by_order(table: StrainTable, section: Section, points: Array) -> Array:
+    """Derivative of a table's strains by n, in which they are linear, per unit of the amplitudes, (elements, stations, 6, points, amplitudes)."""
+    (u, v, w), still = table.displacement[0, 0], 0 * table.displacement[0, 0, 0]
+    rho = _tall(section.r)[..., 0] + _tall(section.normal_r * section.thickness / 2)[..., 0] * points[:, None]
+    return np.stack([still, v, still, -u, still, -w]) / rho[:, :, None]
+
+
 def lame(E: Array, nu: Array, plane_stress: bool) -> tuple[Array, Array]:
     """Lamé's λ and G; in plane stress λ is replaced by 2 G λ/(λ + 2 G) = E ν/(1 - ν²)."""
     G = E / (2 * (1 + nu))

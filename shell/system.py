@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -43,16 +44,26 @@ class ShellGroup:
             found[element] = integrate(stations[[element]], own)[0]
         return found
 
-    def plain(self, size: int) -> "scipy.sparse.csr_matrix":
-        """From all raw unknowns, so many, to those of the elements in the plain basis, where nothing is a difference."""
+    @cached_property
+    def sums(self) -> tuple[Index, Index]:
+        """Unknowns (flat) of which the plain basis, where nothing is a difference, adds the second ones to the first."""
         number = np.arange(self.unknowns.size).reshape(len(self.unknowns), self.table.along.shape[2], -1)
-        rows, of = [number.ravel()], [number.ravel()]
-        for element, node in self.anchors:
-            others = np.delete(number[element], node, axis=0)
-            rows.append(others.ravel())
-            of.append(np.broadcast_to(number[element, node], others.shape).ravel())
-        to, raw = np.concatenate(rows), self.unknowns.ravel()[np.concatenate(of)]
-        return scipy.sparse.csr_matrix((np.ones(len(to)), (to, raw)), shape=(number.size, size))
+        pairs = [(np.delete(number[element], node, axis=0), number[element, node]) for element, node in self.anchors]
+        both = [np.broadcast_arrays(*pair) for pair in pairs]
+        to, of = (np.concatenate([number[:0, 0, 0], *(pair[k].ravel() for pair in both)]) for k in (0, 1))
+        return to, of
+
+    def spread(self, own: Array) -> Array:
+        """Unknowns of the plain basis from those that are solved for, flat."""
+        to, of = self.sums
+        own[to] += own[of]
+        return own
+
+    def plain(self, own: "scipy.sparse.csr_matrix") -> "scipy.sparse.csr_matrix":
+        """From what `own` takes to the unknowns that are solved for to those of the plain basis."""
+        to, of = (np.concatenate([np.arange(self.unknowns.size), one]) for one in self.sums)
+        sums = scipy.sparse.csr_matrix((np.ones(len(to)), (to, of)), shape=(self.unknowns.size,) * 2)
+        return scipy.sparse.csr_matrix(sums @ own)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -97,10 +108,13 @@ class SolidGroup:
     boundary: Support
     signs: Array  # (cells, functions), which turn the cells' edges the same way
 
-    def plain(self, size: int) -> "scipy.sparse.csr_matrix":
-        """From all raw unknowns, so many, to those of functions as they are in each cell."""
-        signs, to = np.repeat(self.signs, 3, axis=1).ravel(), np.arange(self.unknowns.size)
-        return scipy.sparse.csr_matrix((signs, (to, self.unknowns.ravel())), shape=(len(to), size))
+    def spread(self, own: Array) -> Array:
+        """See `ShellGroup.spread`; functions are as they are in each cell."""
+        return own * np.repeat(self.signs, 3, axis=1).ravel()
+
+    def plain(self, own: "scipy.sparse.csr_matrix") -> "scipy.sparse.csr_matrix":
+        """See `ShellGroup.plain`."""
+        return scipy.sparse.csr_matrix(scipy.sparse.diags_array(np.repeat(self.signs, 3, axis=1).ravel()) @ own)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -223,11 +237,13 @@ class System:
     @cached_property
     def plain(self) -> "list[scipy.sparse.csr_matrix]":
         """From the free unknowns to those that the tables of every group take, (elements × size)."""
-        return [group.plain(self.constraint.shape[0]) @ self.constraint for group in self.groups]
+        ends = pairwise(np.cumsum([0, *(group.unknowns.size for group in self.groups)]))
+        return [group.plain(self._choice[0][a:b]) for group, (a, b) in zip(self.groups, ends, strict=True)]
 
     def spread(self, free: Array) -> list[Array]:
         """Element unknowns (elements, size) of every group from the free unknowns of one vector."""
-        return [(P @ free).reshape(group.unknowns.shape) for P, group in zip(self.plain, self.groups, strict=True)]
+        raw = self.constraint @ free
+        return [group.spread(raw[group.unknowns.ravel()]).reshape(group.unknowns.shape) for group in self.groups]
 
     def gather(self, loads: list[Array]) -> Array:
         """Loads on the free unknowns from those on the functions of every group."""

@@ -171,7 +171,7 @@ class PairBasis:
 
     def forces(self, T: Array) -> Array:
         """A of combinations T (basis, 2) of the vectors."""
-        return np.asarray(np.einsum("ubc,bv->uvc", self.force, T))
+        return np.asarray(np.einsum("ubc,bv->uvc", self.force, T, optimize=True))
 
     def fold(self, at: float = 0.0) -> tuple[Array, Array, Array]:
         """A at λ + at on the pair with the rest folded onto it, T, and Tᵀ M T."""

@@ -22,7 +22,7 @@ import numpy as np
 
 from shell.elastic import COSINE, SINE, Constants
 from shell.imperfection.field import Field, values_around
-from shell.kernel import Section, energy_weights, shell_table
+from shell.kernel import Section, energy_weights, shell_table, strains_by_order
 from shell.quadrature import Array, Basis, gauss
 
 HEIGHTS = 4  # of a layer, at most: exact to the third power of the height
@@ -136,16 +136,14 @@ class Stretch:
 
     def _wall(self, eta: Array, stiff: Array, heavy: Array) -> Wall:
         """At heights η, of which so much counts for the stiffness and for the mass, dη, (stations, heights, θ)."""
-        still, turned = (
-            shell_table(self.section, k, self.orders, (eta, np.ones(len(eta))), self.along) for k in (0, 1)
-        )
+        still = shell_table(self.section, 0, self.orders, (eta, np.ones(len(eta))), self.along)
         stations, amplitudes = self.section.r.size, still.displacement.shape[-1]
-        ordered = [one.strain[:, :, COSINE + SINE].reshape(stations, -1, 2 * amplitudes) for one in (still, turned)]
-        by_order = (ordered[1] - ordered[0])[..., :amplitudes]  # the strains are linear in k
+        parts = still.strain, strains_by_order(still, self.section, eta)
+        ordered = [np.reshape(one[:, :, COSINE + SINE], (stations, 6 * len(eta), -1)) for one in parts]
         volume = still.volume.reshape(stations, 1, -1, 1, 1) * (2 * np.pi / self.theta.size)
         lam, G, rho = (one.reshape(-1, 1, 1, 1, 1) for one in (*self.constants.lame, self.constants.rho))
         return Wall(
-            self.elements, still.along, np.concatenate([ordered[0], by_order], axis=2),
+            self.elements, still.along, np.concatenate(ordered, axis=2),
             still.displacement[0, 0, ALONG + AROUND].reshape(-1, amplitudes),
             lam, G * energy_weights(still.transverse_shear)[COSINE + SINE, None, None, None], rho,
             volume * stiff[:, None, :, None], volume * heavy[:, None, :, None],
