@@ -25,6 +25,8 @@ from studies.record.one_law import Course
 from studies.record.stability import read_stability
 
 FEWEST = 20  # averages of a run over temperature that are not made wider
+SENSITIVITIES = "temperature", "rate of temperature"
+MOST_BENDS = 2  # of the bias over temperature: a parabola, a cubic
 BLOCK = 100.0  # averaging of the output over temperature (s)
 WARM_BLOCK = 10.0
 MOST_POINTS = 100_000
@@ -107,7 +109,9 @@ def _deviation(deviation: float, free: int, sources: Sequence[str]) -> Measured:
 
 
 def measure_temperature(records: Sequence[Record], output: str) -> Found:
-    """Bias over temperature and its rate, fitted together, what they leave, and the frequency's slope (12.8).
+    """Bias over temperature and its rate, fitted together, what they leave, and the frequency's slope (12.8), each at the mean temperature.
+
+    The bias bends over temperature where that lowers m ln SSE + p ln m of whitened rows: a bend that is left out is told as a rate.
 
     Where the frequency is measured, the temperature is that of the resonator, which lags as the frequency shows.
     """
@@ -125,20 +129,33 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
         y = np.concatenate([run.output for run in courses])
         ends = np.cumsum([0, *(len(run.time) for run in courses)])
         runs = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
-        names = [*(f"offset {k + 1}" for k in range(len(runs))), "temperature", "rate of temperature"]
+        names = [*(f"offset {k + 1}" for k in range(len(runs))), *SENSITIVITIES]
 
-        def fit_behind(lags: Sequence[float]) -> ColouredFit:
+        def fit_behind(lags: Sequence[float], bends: int = 0, theta: float | None = None) -> ColouredFit:
             followed = [run.behind(*lags) for run in courses]
             T = np.concatenate(followed)
-            slope = np.concatenate([np.gradient(own, run.time) for own, run in zip(followed, courses, strict=True)])
+            slope = np.concatenate(
+                [np.gradient(own, run.time, edge_order=2) for own, run in zip(followed, courses, strict=True)]
+            )
             offsets = scipy.linalg.block_diag(*(np.ones((len(own), 1)) for own in followed))
+            powers = range(2, 2 + bends)
+            X = np.column_stack([offsets, T - T.mean(), slope, *((T - T.mean()) ** n for n in powers)])
             with naming(", ".join(paths)):
-                return fit_coloured(np.column_stack([offsets, T - T.mean(), slope]), y, names, runs)
+                return fit_coloured(X, y, [*names, *(f"temperature^{n}" for n in powers)], runs, theta)
 
-        fit = fit_behind(lags)
-        b, free = fit.regression.coefficients[-2:], max(len(y) - len(names), 1)
-        by_lags = jackknife([fit_behind(own).regression.coefficients[-2:] for own in without]) if without else 0.0
-        sd_of = np.hypot(fit.regression.standard_errors[-2:], by_lags)
+        levels = len(np.unique(np.concatenate([run.drive for run in courses])))
+        most = max(min(MOST_BENDS, levels - 2), 0)
+        theta = fit_behind(lags, most).theta  # a bend that is left is no noise
+        bent = [fit_behind(lags, bends, theta).regression.sum_of_squares for bends in range(most + 1)]
+        m = len(y)
+        bends = int(np.argmin([m * math.log(max(own, 1e-300)) + p * math.log(m) for p, own in enumerate(bent)]))
+        fit, chosen = fit_behind(lags), fit_behind(lags, bends).regression
+        both = slice(len(runs), len(names))
+        b, free = chosen.coefficients[both], max(len(y) - len(names) - bends, 1)
+        by_lags = (
+            jackknife([fit_behind(own, bends).regression.coefficients[both] for own in without]) if without else 0.0
+        )
+        sd_of = np.hypot(chosen.standard_errors[both], by_lags)
         found["bias_temperature_slope_deg_per_h_per_K"] = within(float(b[0]), float(sd_of[0]), paths, free)
         found["bias_temperature_rate_deg_per_h_s_per_K"] = within(float(b[1]), float(sd_of[1]), paths, free)
         left = [fit.residuals[rows] - fit.residuals[rows].mean() for rows in runs]

@@ -25,12 +25,13 @@ class Course:
     _behind: dict[tuple[float, ...], Array] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def behind(self, *lags: float) -> Array:
-        """Return what is followed behind lags (s) in series, settled at the start; each once, since every law tries the same lags."""
+        """Return what is followed behind lags (s) in series, settled where the first mean begins; each once, since every law tries the same lags."""
         if lags not in self._behind:
-            found = self.drive
+            half, begin = (self.time[1] - self.time[0]) / 2, 1.5 * self.drive[0] - 0.5 * self.drive[1]
+            steps, found = np.r_[half, np.diff(self.time)], np.r_[begin, self.drive]
             for lag in lags:
-                found = follow_lag(found, np.diff(self.time), lag)
-            self._behind[lags] = found
+                found = follow_lag(found, steps, lag)
+            self._behind[lags] = found[1:]
         return self._behind[lags]
 
     def earlier(self, by: float) -> "Course | None":

@@ -167,6 +167,26 @@ def test_intervals_over_temperature_know_the_error_of_the_lags():
         assert 0.1 < np.sqrt(np.mean(np.square(own))) < 1.5, key
 
 
+def test_a_bias_that_bends_over_temperature_keeps_its_sensitivities():
+    """−56 °/h/(K/s) beside 0.001 °/h/K² was −75 ± 6, and −52 ± 2 without the bend: the resonator began as its housing was within the first mean."""
+    g, t, runs = np.random.default_rng(1), np.arange(0, 18000.0, 10.0), []
+    for k, (begin, end) in enumerate([(25.0, -20.0), (-20.0, 25.0), (-20.0, 45.0)]):
+        fades, late = np.exp(-t / 1500.0), (1500 * np.exp(-t / 1500.0) - 900 * np.exp(-t / 900.0)) / 600.0
+        T, housing = (end + (begin - end) * own for own in (late, fades))
+        bias = k + 0.05 * T + 1e-3 * T**2 - 56.0 * np.gradient(T, t) + 0.1 * g.standard_normal(t.size)
+        f = 4432 + 0.31 * T + 2e-4 * g.standard_normal(t.size)
+        columns = {"time_s": t, "housing_temperature_degC": housing, "frequency_Hz": f, "bias_deg_per_h": bias}
+        runs.append((Record(columns, path=f"run{k}"), T))
+    found = measure_temperature([record for record, _ in runs], "bias_deg_per_h")
+    mean = float(np.mean([T for _, T in runs]))
+    for key, truth in (
+        ("bias_temperature_slope_deg_per_h_per_K", 0.05 + 2e-3 * mean),
+        ("bias_temperature_rate_deg_per_h_s_per_K", -56.0),
+    ):
+        assert found[key].value == pytest.approx(truth, rel=0.03), key
+        assert found[key].low < truth < found[key].high, key
+
+
 @pytest.mark.parametrize("column", ["frequency_Hz", "housing_temperature_degC"])
 def test_what_is_no_rate_is_not_judged_as_the_bias(folder, capsys, column):
     status, _, said = judged(capsys, folder, ("cycle",), "--output", column)
