@@ -103,13 +103,6 @@ def test_a_profile_drives_the_resonator_not_its_reading(card, tmp_path):
     assert record["inverse_q"][-1] == pytest.approx(1e-7 / np.cos(np.radians(3.0)), rel=3e-4)
 
 
-@pytest.mark.parametrize("lines", ["", 'mode = "whole-angle"\n'], ids=["force-rebalance", "no self-precession"])
-def test_a_reversal_of_what_does_not_precess_is_refused(card, refuse, lines):
-    assert "--both-ways reverses the self-precession of a whole-angle wave" in refuse(
-        ["loop", card(lines), "--both-ways"]
-    )
-
-
 @pytest.mark.parametrize(
     ("lines", "words", "said"),
     [
@@ -117,10 +110,14 @@ def test_a_reversal_of_what_does_not_precess_is_refused(card, refuse, lines):
         ("frequency_split_mHz = 5000.0\n", [], "can null a split of at most 306"),
         ('quadrature_control = "stiffness"\nfrequency_split_mHz = 5000.0\n', [], "quadrature_range_Hz = 1"),
         ('mode = "whole-angle"\nself_precession_deg_per_s = 60.0\n', [], "the self-precession of 60 °/s takes 217.7 %"),
+        *(
+            (lines, ["--both-ways"], "--both-ways reverses the self-precession of a whole-angle wave")
+            for lines in ("", 'mode = "whole-angle"\n')
+        ),
     ],
-    ids=["rate", "split, force", "split, stiffness", "self-precession"],
+    ids=["rate", "split, force", "split, stiffness", "self-precession", "no wave to reverse", "nothing to reverse"],
 )
-def test_what_the_actuators_cannot_hold_is_refused_with_their_range(card, tmp_path, refuse, lines, words, said):
+def test_what_the_loops_cannot_do_is_refused_with_their_range(card, tmp_path, refuse, lines, words, said):
     """n k Ω, ½ Δω and n θ̇ against n k Ω_max: k = 0.2756 of the dome, so that 100 °/s hold a split of n k Ω_max/π = 306 mHz."""
     path = card(lines)
     assert said in refuse(["loop", path, *words])

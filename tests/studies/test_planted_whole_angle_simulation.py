@@ -75,17 +75,17 @@ def test_self_precession_is_taken_out_of_the_rate(tmp_path):
     assert abs(np.mean(bias)) < 0.03 * np.max(bias)
 
 
+WAVE = from_quality(4432.0, 1e6, damping_anisotropy=0.02, damping_axis=0.2, frequency_split=5e-3, frequency_axis=0.1)
+
+
 def test_settled_turning_is_the_loops_own_run_without_their_lag():
     """Every error of the electronics, against the loops sample by sample: to second order in the errors."""
     time = np.arange(0.0, 1200.0, 2.0)
-    wave = from_quality(
-        4432.0, 1e6, damping_anisotropy=0.02, damping_axis=0.2, frequency_split=5e-3, frequency_axis=0.1
-    )
     errors = Electronics(Channels(0.004, 0.002, 0.003, 0.001, 0.004), Channels(-0.005, 0.001, 0.002, 5e-4, 0.006))
     for precession in (0.0, 1e-3):
-        loops = simulate_whole_angle(wave, errors, Loops(), time, rate=7e-5, precession=precession, angle=0.1)
-        settled = turn_settled(wave, errors, time, rate=7e-5, precession=precession, angle=0.1)
-        ideal = turn_settled(wave, Electronics(), time, rate=7e-5, precession=precession, angle=0.1)
+        loops = simulate_whole_angle(WAVE, errors, Loops(), time, rate=7e-5, precession=precession, angle=0.1)
+        settled = turn_settled(WAVE, errors, time, rate=7e-5, precession=precession, angle=0.1)
+        ideal = turn_settled(WAVE, Electronics(), time, rate=7e-5, precession=precession, angle=0.1)
         made = np.ptp(loops.angle - ideal.angle)
         assert made > 1e-2
         assert np.abs(settled.angle - loops.angle).max() < 0.02 * made
@@ -94,19 +94,16 @@ def test_settled_turning_is_the_loops_own_run_without_their_lag():
 def test_settled_commands_of_a_turning_wave_are_those_of_the_loops():
     """Amplitude's drive, quadrature, frequency and rate, each against its own swing around: the gains make the amplitude swell."""
     time = np.arange(0.0, 1200.0, 1.0)
-    wave = from_quality(
-        4432.0, 1e6, damping_anisotropy=0.02, damping_axis=0.2, frequency_split=5e-3, frequency_axis=0.1
-    )
     errors = Electronics(Channels(0.008, 0.002, 0.003, 0.001, 0.004), Channels(-0.005, 0.001, 0.002, 5e-4, 0.006))
     precession = np.radians(0.5) * np.where(time < 600, 1.0, -1.0)
-    loops = simulate_whole_angle(wave, errors, Loops(), time, rate=7e-5, precession=precession, angle=0.1)
-    settled = read_turning(wave, errors, loops.angle, rate=7e-5, time=time)
+    loops = simulate_whole_angle(WAVE, errors, Loops(), time, rate=7e-5, precession=precession, angle=0.1)
+    settled = read_turning(WAVE, errors, loops.angle, rate=7e-5, time=time)
     inside = np.abs(time[:-1] - 600) > 5
     for name in ("rate", "quadrature", "decay", "omega"):
         values = getattr(settled, name)
         made, found = getattr(loops, name)[:-1][inside], ((values[1:] + values[:-1]) / 2)[inside]
         assert np.std(found - made) < 0.01 * np.std(made), name
-    given = read_turning(wave, errors, loops.angle[:500], rate=7e-5, precession=np.radians(0.5))
+    given = read_turning(WAVE, errors, loops.angle[:500], rate=7e-5, precession=np.radians(0.5))
     assert given.rate[5:495] == pytest.approx(settled.rate[5:495], abs=1e-3 * np.std(settled.rate))
 
 
