@@ -29,6 +29,7 @@ SENSITIVITIES = "temperature", "rate of temperature"
 MOST_BENDS = 2  # of the bias over temperature: a parabola, a cubic
 BLOCK = 100.0  # averaging of the output over temperature (s)
 WARM_BLOCK = 10.0
+HOLD_PARTS = 4  # of a constant rate, whose means tell its noise
 MOST_POINTS = 100_000
 CONFIDENCE = 0.9
 YEAR = 365.25 * 86400.0
@@ -192,7 +193,7 @@ def _course(record: Record, output: str, width: float) -> Course:
 
 
 def measure_scale(record: Record) -> Found:
-    """Scale factor, its nonlinearity and asymmetry, from the means of constant rates (12.9)."""
+    """Scale factor, its nonlinearity and asymmetry, from the means of constant rates (12.9); what repeats at a rate is nonlinearity and no error of the line."""
     applied, measured = record["rate_deg_per_s"], record["measured_rate_deg_per_s"]
     keep = np.isfinite(applied) & np.isfinite(measured)
     applied, measured = applied[keep], measured[keep]
@@ -203,32 +204,37 @@ def measure_scale(record: Record) -> Found:
         settled = slice(begin + (end - begin) // 4, end)  # the first quarter is the table's and the filter's
         y = measured[settled]
         if len(y) >= 8:
-            levels.append((float(applied[settled].mean()), float(y.mean()), float(y.std(ddof=1) / math.sqrt(len(y)))))
-    rates, means, errors = np.array(levels).T if levels else np.zeros((3, 0))
+            parts = [float(part.mean()) for part in np.array_split(y, HOLD_PARTS)]
+            levels.append((float(applied[settled].mean()), float(y.mean()), float(np.var(parts, ddof=1)) / HOLD_PARTS))
+    rates, means, squares = np.array(levels).T if levels else np.zeros((3, 0))
     if len(np.unique(same_rate(rates))) < 3:
         raise InputError(f"{record.path}: a scale factor needs at least three constant rates of eight rows each.")
     full, source = float(np.abs(rates).max()), [record.path]
+    sd, free = _error_of_means(rates, means, float(squares.mean()))
     with naming(record.path):
         departure = measure_nonlinearity(rates, means)
-        fit = fit_linear(rates[:, None], means, ["rate"])
-    found = {
-        "scale_factor_error_ppm": of_fit(fit, 1, source, 1e6, -1.0),
-        "scale_factor_nonlinearity_ppm": within(departure, float(np.max(errors)) / full, source, least=0.0, scale=1e6),
-    }
+    found = {"scale_factor_nonlinearity_ppm": within(departure, sd / full, source, free, least=0.0, scale=1e6)}
+    line = np.linalg.pinv(np.column_stack([rates, np.ones_like(rates)]))[0]
+    error = float(line @ means) - 1.0
+    found["scale_factor_error_ppm"] = within(error, sd * float(np.linalg.norm(line)), source, free, scale=1e6)
     if rates.min() < 0 < rates.max():
-        found["scale_factor_asymmetry_ppm"] = _asymmetry(rates, means, errors, source)
+        # ΔK/K of b + K Ω + ½ ΔK |Ω|: the scale factor of positive rates less that of negative ones, over their mean (IEEE 528)
+        both = np.linalg.pinv(np.column_stack([rates, np.abs(rates) / 2, np.ones_like(rates)]))[:2]
+        K, difference = (float(own) for own in both @ means)
+        asymmetry = within(difference / K, sd * float(np.linalg.norm(both[1])) / abs(K), source, free, scale=1e6)
+        found["scale_factor_asymmetry_ppm"] = asymmetry
     return found
 
 
-def _asymmetry(rates: Array, means: Array, errors: Array, sources: Sequence[str]) -> Measured:
-    """ΔK/K of the output b + K Ω + ½ ΔK |Ω|: the scale factor of positive rates less that of negative ones, over their mean (IEEE 528)."""
-    X = np.column_stack([np.ones_like(rates), rates, np.abs(rates) / 2])
-    solving = np.linalg.pinv(X)
-    _, K, difference = fitted = solving @ means
-    free = len(rates) - X.shape[1]
-    scatter = float(np.sum((means - X @ fitted) ** 2)) / max(free, 1)
-    variance = max(scatter, float(np.mean(errors**2))) * float(solving[2] @ solving[2])
-    return within(difference / K, math.sqrt(variance) / abs(K), sources, free or np.inf, scale=1e6)
+def _error_of_means(rates: Array, means: Array, noise: float) -> tuple[float, int]:
+    """Return the standard error of a mean and its degrees of freedom: of repeated rates where they scatter more than `noise`, the variance from within the holds, lets expect (5 %), else of both."""
+    _, kind = np.unique(same_rate(rates), return_inverse=True)
+    apart = means - (np.bincount(kind, means) / np.bincount(kind))[kind]
+    within_holds, repeated = (HOLD_PARTS - 1) * len(rates), len(rates) - int(kind.max()) - 1
+    squares = float(apart @ apart)
+    if repeated and squares > repeated * noise * scipy.special.fdtri(repeated, within_holds, 0.95):
+        return math.sqrt(squares / repeated), repeated
+    return math.sqrt((squares + within_holds * noise) / (repeated + within_holds)), repeated + within_holds
 
 
 def measure_warm_up(record: Record, output: str, band: float | None) -> tuple[Found, float]:

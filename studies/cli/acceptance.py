@@ -89,6 +89,8 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     missing.sort(key=lambda row: float(row["section"].split("–")[0].split(".")[1]))
     used = Column(lambda record: found.used[record.path], "test")
     note = "A limit is judged only if the whole interval lies on one side of it. An upper limit applies to the magnitude."  # fmt: skip
+    if any(row["section"] == "12.9" and not row["needs"] for row in rows):
+        note += " The scale factor is that of the straight line; its error is that of the noise while a rate is held and, where they scatter more, of rates held again: without such a record errors from hold to hold are not known."
     if found.band is not None:
         note += f" Warm-up ends when the output stays within ±{found.band:.3g} °/h of its final value."
     parts: list[Chapter | Part] = [
