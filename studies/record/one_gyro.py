@@ -11,7 +11,7 @@ from studies.errors import InputError
 from studies.record import Record
 from studies.record.one_law import ANY_PATH, LEVELLED, Course, Followed, Law, course_of, likeliest
 from studies.record.repeated import drop_repeats
-from studies.record.rest import DRIVING, check_record, without_stuck
+from studies.record.rest import DRIVING, check_record, without_spikes, without_stuck
 
 FREQUENCY, BIAS, RATE = "frequency_Hz", "bias_deg_per_h", "measured_rate_deg_per_s"
 ONE_GYRO, STEEPEST = 5e-3, 3e-4  # relative, and 1/K: what one gyro does from run to run, and over temperature at most
@@ -44,12 +44,13 @@ def runs_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -> t
     kept, said = drop_repeats(records)
     said += filter(None, map(check_record, kept))
     kept = [without_stuck(record) for record in kept]
-    check_one_gyro(kept)
-    check_one_unit(kept)
-    check_one_sign(kept)
-    check_one_reading(kept)
-    check_one_clock(kept)
-    if (odd := run_apart(kept)) is not None:
+    seen = [without_spikes(record) for record in kept]
+    check_one_gyro(seen)
+    check_one_unit(seen)
+    check_one_sign(seen)
+    check_one_reading(seen)
+    check_one_clock(seen)
+    if (odd := run_apart(seen)) is not None:
         k, away = odd
         said.append(
             f"{_path(kept, k)}: {FREQUENCY} is {away:+.2g} Hz from what the other records have at the same temperatures:"

@@ -51,6 +51,13 @@ def drop_spikes(keep: NDArray[np.bool_], *columns: Array) -> NDArray[np.bool_]:
     return cleaned
 
 
+def without_spikes(record: Record) -> Record:
+    """Return a record without the readings that such rows are left out for."""
+    names = [name for name in (*OUTPUTS, *TEMPERATURES) if name in record]
+    spikes = {name: find_spikes(record[name], LEAST_SPIKE) for name in names}
+    return record.with_columns({name: np.where(rows, np.nan, record[name]) for name, rows in spikes.items()})
+
+
 def choose_column(records: Sequence[Record], candidates: Sequence[str], purpose: str) -> str:
     """Return the first candidate that every record has."""
     for name in candidates:

@@ -317,6 +317,19 @@ def test_a_run_that_lies_apart_is_named_with_its_distance(with_another, k):
         assert f"run{k}.csv: frequency_Hz is {apart:+.2g} Hz from what the other records have" in said[0]
 
 
+def test_a_spike_is_no_clock():
+    """One reading of 9999 Hz in 1800 rows made two clocks of two healthy runs, 2 h apart."""
+    g, time, runs = np.random.default_rng(1), np.arange(0.0, 18000.0, 10.0), []
+    for begin, end in ((25.0, -20.0), (-20.0, 45.0)):
+        fades = np.exp(-time / 1500.0), (1500 * np.exp(-time / 1500.0) - 900 * np.exp(-time / 900.0)) / 600.0
+        housing, T = (end + (begin - end) * own for own in fades)
+        frequency = 5210.0 + 0.31 * T + 2e-4 * g.standard_normal(time.size)
+        columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": frequency}
+        runs.append(Record(columns, path=f"run{len(runs)}.csv"))
+    runs[0] = spoilt(runs[0], frequency_Hz=lambda f: np.where(np.arange(f.size) == 500, 9999.0, f))
+    assert records_of_one_gyro(runs, print) == runs
+
+
 def test_a_diagnosis_leaves_out_a_run_that_lies_apart(with_another):
     """Such a run was "second-lag 0.86", beside a held-out gain of 0.7."""
     found = make_ready(with_another(1))
