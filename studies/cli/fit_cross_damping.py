@@ -22,6 +22,7 @@ from studies.reports import style
 from studies.reports.digits import lowered, raised
 from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
+CHANGES = 0.1  # part of a frequency, more than temperature or trimming ever changes
 LABELS = {
     "training": "fitted, rows",
     "training_averages_100s": "fitted, 100 s averages",
@@ -58,7 +59,12 @@ def fit_cross_damping(
         calibration_temperature: Temperature in °C about which the polynomial is expanded.
     """
     records = records_of_one_gyro([read_record(path) for path in data], say)
-    carrier = frequency if frequency is not None else _median(records, "frequency_Hz", "--frequency")
+    carrier = frequency
+    if carrier is None or any(record.has_values("frequency_Hz") for record in records):
+        measured = _median(records, "frequency_Hz", "--frequency")
+        carrier = measured if carrier is None else carrier
+        if abs(carrier / measured - 1) > CHANGES:
+            raise InputError(f"--frequency {carrier:g}: frequency_Hz of the records is {measured:.6g} Hz (median), and no resonator changes by so much. Correct the option or the column.")  # fmt: skip
     if quality is None:
         loss = _median(records, "inverse_q", "--quality")
         quality = 1 / loss if loss else float("inf")

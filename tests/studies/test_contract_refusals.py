@@ -69,6 +69,7 @@ REFUSED = {
     "calibrate hrg-30mm RUN --hold-out 3": "there is 1 record, numbered from 1",
     "diagnose RUN --chamber 'rate 1 range 85 -40'": "the lower one first",
     "fit bias RUN --average -5": "--average -5: must be positive",
+    "fit cross-damping RUN --frequency 4.432 --quality 1e4": "--frequency 4.432: frequency_Hz of the records is 4432 Hz (median)",
     "fit cross-damping RUN --order 50": "--order 50: must be 1 to 9",
     "fit cross-damping RUN --quality 1e4 --calibration-temperature -300": "no gyro has this temperature",
     "fit frequency HRG --resolution 0": "--resolution 0: must be positive",
