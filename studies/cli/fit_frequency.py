@@ -67,6 +67,7 @@ def fit_frequency(
     }
     low, high = fit.temperature_range_degC
     figures = [parts.fit_figure(study), parts.error_figure(study)]
+    settled = bool(soaks) and resolution is None
     note = f"Judged with a time constant of {slowest / 60:.0f} min."
     return Result(
         payload,
@@ -76,8 +77,10 @@ def fit_frequency(
             parts.facts(study),
             parts.order_sentence(study),
             Chapter("Settled parts", [Table("Settled parts of the records", rows, SOAKS, note)]),
-            Chapter("Fit and inverse", [parts.coefficients_table(study), parts.inverse_table(study), *figures]),
-            Chapter("Order of the polynomial", parts.order_parts(study, bool(soaks) and resolution is None)),
+            Chapter(
+                "Fit and inverse", [parts.coefficients_table(study, settled), parts.inverse_table(study), *figures]
+            ),
+            Chapter("Order of the polynomial", parts.order_parts(study, settled)),
         ],
         sources=parts.SOURCES,
     )

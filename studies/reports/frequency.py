@@ -33,15 +33,18 @@ def facts(study: FrequencyStudy) -> Facts:
     ])  # fmt: skip
 
 
-def coefficients_table(study: FrequencyStudy) -> Table:
-    """Return the polynomial's coefficients with their standard errors."""
+def coefficients_table(study: FrequencyStudy, settled: bool = False) -> Table:
+    """Return the polynomial's coefficients with their standard errors, which of settled parts are bounds."""
     rows = [
         {"name": f"a{k}" if k else "f0", "value": c, "error": u, "unit": "Hz" + f"/°C{raised(k) * (k > 1)}" * (k > 0)}
         for k, (c, u) in enumerate(zip(study.fit.coefficients, study.fit.standard_errors, strict=True))
     ]
     columns = "name: Coefficient | value ± error: Value | Unit"
     low, high = valid_range(study.fit)
-    note = f"With standard errors; a saved model has all digits and is valid from {low:.4g} to {high:.4g} °C, a little beyond the data."
+    errors = "standard errors;"
+    if settled and study.fit.regression.variance == study.fit.regression.least_variance:
+        errors = "errors that allow every part what the least settled one may be off, so bounds rather than scatter;"
+    note = f"With {errors} a saved model has all digits and is valid from {low:.4g} to {high:.4g} °C, a little beyond the data."
     return Table(f"Coefficients about T0 = {study.fit.reference_temperature_degC:g} °C", rows, columns, note)
 
 

@@ -98,6 +98,7 @@ def test_a_model_of_several_records_names_them_all(tmp_path, capsys):
     _staircase(second, 10, 40, 30)
     assert main(["fit", "frequency", str(first), str(second), "--save", str(tmp_path / "m.toml")]) == 0
     said = capsys.readouterr().out
+    assert "so bounds rather than scatter" in " ".join(said.split())  # 5.5 times the scatter
     assert "every settled part is uncertain by" in said
     assert "last digit" not in said
     sources = read_model(tmp_path / "m.toml").sources
