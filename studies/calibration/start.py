@@ -88,6 +88,10 @@ def find_start(instrument: "Instrument", record: "Record", drive: "Drive", readi
 def _read(problem: CardProblem, readings: float) -> tuple[Array, Array]:
     """Most probable coordinates and their covariance by first readings, whose level may be off by what the card does not know of it."""
     (run,) = problem.runs
+    if readings > (lasts := float(np.ptp(run.inner.time))):
+        raise InputError(
+            f"{run.record.path}: --start of {readings:g} s is longer than the record, {lasts:g} s; give less."
+        )
     first = {name: blocks.until(run.inner.time[0] + readings) for name, blocks in run.responses.items()}
     first = {name: blocks for name, blocks in first.items() if len(blocks.time) >= FEWEST}
     if not first:

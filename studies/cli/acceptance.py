@@ -95,7 +95,7 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
         note += f" Warm-up ends when the output stays within ±{found.band:.3g} °/h of its final value."
     parts: list[Chapter | Part] = [
         Facts(_facts(found)),
-        Chapter("Quantities", [Table("Measured, in the order of IEEE Std 1431", [row for row in rows if not row["needs"]], MEASURED, note)]),
+        Table("Measured, in the order of IEEE Std 1431", [row for row in rows if not row["needs"]], MEASURED, note),
         Chapter("Drift (12.11)", _drift(found)),
         Chapter("Not judged", [Table("Missing quantities and tests", missing,
             "words: quantity | section | limited: has a limit | needs")]),
@@ -140,8 +140,8 @@ def _facts(found: Acceptance) -> list[Fact]:
     return [
         ("Verdict", found.verdict, VERDICTS[found.verdict]),
         ("Limits met", f"{len(judged['pass'])} of {limited}", ""),
-        ("Not met", str(len(judged["fail"])), ", ".join(judged["fail"])),
-        ("Undecided or missing", str(len(undecided)), ", ".join(undecided)),
+        ("Not met", str(len(judged["fail"])), "; ".join(judged["fail"])),
+        ("Undecided or missing", str(len(undecided)), "; ".join(undecided)),
     ]
 
 

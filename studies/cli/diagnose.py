@@ -69,7 +69,8 @@ def _plan(profiles: list[str], card: str | None, limits: Chamber | None) -> Resu
 
     for path in profiles:
         if Path(path).is_file() and set(OUTPUTS) & set(read_header(path)):
-            raise InputError(f"{path}: this is a record of a run; --plan takes profiles of runs to come. Leave out --plan to diagnose records; --next then proposes a run.")  # fmt: skip
+            what = "record of a run" if "time_s" in read_header(path) else "steady-state table"
+            raise InputError(f"{path}: this is a {what}; --plan takes profiles of runs to come. Leave out --plan to diagnose it; of records, --next then proposes a run.")  # fmt: skip
     if card is None:
         say(f"no --card given: planning with the card {PLANNED}.")
     with Told("plan", {"all effects in all shapes": 0.3, "what would be answered": 0.7}) as told:

@@ -86,9 +86,7 @@ def fit_cross_damping(
     fitted, held_out = study.training.averages, study.held_out.averages
     residual, dynamic = summary["held_out_averages_100s"]["after"], summary["dynamic_part"]
     left = (
-        f"{numbered(gathered.left_out, 'row')} with an empty cell or an outlier were left out."
-        if gathered.left_out
-        else ""
+        f"Left out: {numbered(gathered.left_out, 'row')} with an empty cell or an outlier." if gathered.left_out else ""
     )
     averaged = f"Long records were averaged over {gathered.block_s:g} s before the fit." if gathered.block_s else ""
     return Result(

@@ -176,7 +176,7 @@ def _remarks(study: ScaleStudy) -> list[str | Sentence]:
         for what, record in _undetermined(study)
     ]
     said = {
-        f"{numbered(study.left_out, 'row')} with an empty cell or an outlier were left out.": study.left_out,
+        f"Left out: {numbered(study.left_out, 'row')} with an empty cell or an outlier.": study.left_out,
         "The rough null and scale are from the record at rest and then at one rate.": study.rough_run,
         "Long records were averaged in blocks before the fit; the held-out error is that of the blocks.": study.averaged,
     }

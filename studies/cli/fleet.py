@@ -54,7 +54,7 @@ def fleet(
     for why in lot.failed.values():
         say(f"hrg: {why}")
     chapters = parts.fleet_parts(lot, lambda serial: f"devices/{serial}.html")
-    result = Result(lot.as_dict(), f"Lot {Path(folder).resolve().name}", parts.headline(lot), chapters)
+    result = Result(lot.as_dict(), f"Gyros of {Path(folder).resolve().name}", parts.headline(lot), chapters)
     write_text(Path(out) / "lot.json", dump_json(result.payload))
     write_text(Path(out) / "lot.html", render_result(result))
     say(f"report: {Path(out) / 'lot.html'}")

@@ -37,6 +37,8 @@ def read_cloud(path: str | Path, unit: Unit = "mm") -> Array | FaceGrid:
         first, skipped = _first_line(file)
         if first.lower().startswith(GRID):
             return _read_grid(file, first, skipped)
+        if "time_s" in first:
+            raise InputError(f"{path}: is a record of a run, with time_s; points must be x y z text, .ply, .stl, .obj or a table.")  # fmt: skip
         if not any(sign.isdigit() for sign in first):  # names of the columns
             first, skipped = _first_line(file, skipped + 1)
         points = _read_text(file, first, skipped)

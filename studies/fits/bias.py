@@ -78,8 +78,10 @@ def study_bias(
     """Fit the bias model to records of a gyro at rest while its temperature changes; `width` and `window` of averages and rate in s."""
     records = records_of_one_gyro(records, progress)
     check_lengths(records)
-    output, column = find_output(records), find_state(records, over)
     width = choose_width(records) if width is None else width
+    if window is not None and window < 3 * width:
+        raise InputError(f"--window {window:g}: the rate is taken over three averages of {width:g} s (--average) or more; give {3 * width:g} or more, or average less.")  # fmt: skip
+    output, column = find_output(records), find_state(records, over)
     window = 3 * width if window is None else window
     variable = FREQUENCY if column == "frequency_Hz" else TEMPERATURE
 
