@@ -150,7 +150,7 @@ def test_the_saved_model_takes_the_law_that_was_chosen(planted, tmp_path, ask):
     error = (column - rate)[~hidden] / noise
     assert np.sqrt(np.mean(error**2)) == pytest.approx(1, abs=0.05)
     assert np.max(np.abs(error.reshape(-1, 200).mean(axis=1))) < 0.5
-    library = compile_c(emit_c(model), tmp_path)
+    library = compile_c(emit_c(model), tmp_path, "25 rows, 0 differ")
     library.hrg_rate.restype, library.hrg_rate.argtypes = ctypes.c_double, [ctypes.c_double] * 2
     rows = zip(record["output_counts"], record["housing_temperature_degC"], strict=True)
     np.testing.assert_allclose([library.hrg_rate(*row) for row in rows], column, rtol=1e-9, atol=1e-11)
@@ -220,7 +220,7 @@ def test_outliers_and_gaps_in_the_calibration_are_left_out(records, fitted, tmp_
 
 def test_emitted_c_agrees_with_python(records, fitted, tmp_path):
     model = read_model(fitted[1])
-    library = compile_c(emit_c(model), tmp_path)
+    library = compile_c(emit_c(model), tmp_path, "25 rows, 0 differ")
     library.hrg_rate.restype = library.hrg_smooth.restype = ctypes.c_double
     library.hrg_rate.argtypes = [ctypes.c_double] * 2
     library.hrg_smooth.argtypes = [ctypes.c_void_p, ctypes.c_double]

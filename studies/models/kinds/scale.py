@@ -8,7 +8,7 @@ output is first rid of what differs while the temperature rises and falls. Range
 length, because readings scatter; outliers, which the fit leaves out, are not judged.
 """
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from compensation.arrays import Array
 from compensation.bell import BellChain, PolynomialCurve, Warming, apply_chain
 from compensation.rate_law import FORMS, RateCurve
 from studies.errors import InputError
-from studies.models.c_source import head, polynomial, write_c
+from studies.models.c_source import head, polynomial, self_test, write_c
 from studies.models.file import Known, Model, ModelPart, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
 from studies.record.rest import drop_spikes
@@ -165,7 +165,21 @@ def emit_c(model: Model) -> str:
     functions = "\n\n".join(curves.values())
     null, scale = repr(rough["null"]), repr(rough["scale"])
     code = write_c("scale", functions=functions, output=model.compensates, null=null, scale=scale, smoother=smoother)
-    return f"{head(model)}\n{code}"
+    return f"{head(model)}\n{code}\n{self_test(_test_rows(model), 'output, temperature_degC, rate before any filter (NaN: not told)', STEP)}"
+
+
+STEP = """    double found = hrg_rate(row[0], row[1]), expected = row[2];
+    if (isnan(expected)) return !isnan(found);"""
+
+
+def _test_rows(model: Model) -> list[tuple[float, ...]]:
+    """Outputs over the fitted rates and temperatures, and what the steps make of them."""
+    chain = replace(load_scale(model), taps=np.empty(0), warming=None)
+    rate, T = (np.linspace(*model.range_of(name), 5) for name in (RATE, model.temperature_column))
+    rate, T = (own.ravel() for own in np.meshgrid(rate, T))
+    output = (rate + chain.bias.value(T)) / chain.scale + chain.null
+    steady = apply_chain(chain, np.arange(float(rate.size)), output, T, extrapolate=True).temperature_compensated
+    return list(zip(output.tolist(), T.tolist(), steady.tolist(), strict=True))
 
 
 def _save_curve(name: str, curve: PolynomialCurve) -> ModelPart:
