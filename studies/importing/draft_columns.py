@@ -34,6 +34,7 @@ def draft_column(
     remark = remark or ("" if stated else "    # CHECK: the name states no unit")
     middle = sorted(numbers)[len(numbers) // 2]
     doubt = f"    # CHECK: by its name {meaning.rather}, which another column fills" if meaning.rather else ""
+    doubt = f"    # CHECK: or {meaning.perhaps}, if it is the applied rate" if meaning.perhaps else doubt
     lines = [f"from = {spell_value(name)}", f'to = "{target}"{doubt}']
     if target.endswith("_degC") and unit == "degC" and 200 < middle < 500:
         unit, remark = "K", "    # CHECK: the values look like kelvin"

@@ -29,6 +29,9 @@ BIDS: tuple[tuple[str, str, int], ...] = (
     (r"(?=.*pick ?-?off)(?=.*(\bx\b|cos|\b1\b|\ba\b))", "pickoff_cos_V", 6),
     (r"(?=.*pick ?-?off)(?=.*(\by\b|sin|\b2\b|\bb\b))", "pickoff_sin_V", 6),
 )  # fmt: skip
+MEASURED, APPLIED = "measured_rate_deg_per_s", "rate_deg_per_s"
+TURNS = r"meas|mess|gyr|sens|out|ausg|omega"
+"""Words of a rate that was measured; without them it may be the table's."""
 FITTING_UNIT = 2
 OWN_NAME = 100
 """Weight of a column's name in a record."""
@@ -60,11 +63,12 @@ AXIS = re.compile(r"^(.*?)([xyz])((?:[^a-z].*)?)$", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a raw column becomes: a column of the record, the axis ("" where there is only one), and what it would be if that were free."""
+    """What a raw column becomes: a column of the record, the axis ("" where there is only one), what it would be if that were free, and what it may be as well."""
 
     target: str
     axis: str = ""
     rather: str = ""
+    perhaps: str = ""
 
 
 def find_meanings(hints: Mapping[str, str], taken: Sequence[str] = (), group: str = "") -> dict[str, Meaning]:
@@ -86,6 +90,9 @@ def find_meanings(hints: Mapping[str, str], taken: Sequence[str] = (), group: st
         if name not in found and target not in filled:
             found[name] = Meaning(target, rather=first[name] if first[name] != target else "")
             filled.add(target)
+    for name, meaning in found.items():
+        if meaning == Meaning(MEASURED) and APPLIED not in filled and not re.search(TURNS, hints[name].lower()):
+            found[name] = Meaning(MEASURED, perhaps=APPLIED)
     return {name: found[name] for name in hints if name in found}
 
 

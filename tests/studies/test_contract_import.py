@@ -394,6 +394,16 @@ def table(folder, head, rows, name="raw.csv"):
     return folder / name
 
 
+@pytest.mark.parametrize(
+    ("head", "doubted"),
+    [("t/s,Drehrate [°/s]", True), ("t/s,gyro rate [°/s]", False), ("t/s,table rate [°/s],rate [°/s]", False)],
+)
+def test_a_rate_of_which_nothing_says_that_it_is_measured_is_to_be_checked(tmp_path, head, doubted):
+    rows = [",".join(["{0}.0", "1.5", "1.5"][: head.count(",") + 1]).format(k) for k in range(20)]
+    said = "# CHECK: or rate_deg_per_s, if it is the applied rate"
+    assert (said in draft_map([str(table(tmp_path, head, rows))]).text) == doubted
+
+
 def draft_and_import(path, folder, *edits):
     text = draft_map([str(path)]).text
     for old, new in edits:
