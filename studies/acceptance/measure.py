@@ -135,9 +135,8 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
         def fit_behind(lags: Sequence[float], bends: int = 0, theta: float | None = None) -> ColouredFit:
             followed = [run.behind(*lags) for run in courses]
             T = np.concatenate(followed)
-            slope = np.concatenate(
-                [np.gradient(own, run.time, edge_order=2) for own, run in zip(followed, courses, strict=True)]
-            )
+            curves = (scipy.interpolate.CubicSpline(run.time, own) for own, run in zip(followed, courses, strict=True))
+            slope = np.concatenate([curve(run.time, 1) for curve, run in zip(curves, courses, strict=True)])
             offsets = scipy.linalg.block_diag(*(np.ones((len(own), 1)) for own in followed))
             powers = range(2, 2 + bends)
             X = np.column_stack([offsets, T - T.mean(), slope, *((T - T.mean()) ** n for n in powers)])

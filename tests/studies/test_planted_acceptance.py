@@ -187,6 +187,15 @@ def test_a_bias_that_bends_over_temperature_keeps_its_sensitivities():
         assert found[key].low < truth < found[key].high, key
 
 
+def test_the_rate_of_a_temperature_that_swings_is_not_flattened_by_its_averages():
+    """Differences over 200 s of a swing of 2500 s made 1 % too much of the sensitivity to it, twice its error."""
+    t = np.arange(0.0, 36000.0, 10.0)
+    bias = 0.5 * np.sin(t / 400.0) - 56.0 * np.cos(t / 400.0) / 40.0 + np.random.default_rng(1).normal(0, 0.1, t.size)
+    columns = {"time_s": t, "housing_temperature_degC": 20 + 10 * np.sin(t / 400.0), "bias_deg_per_h": bias}
+    found = measure_temperature([Record(columns, path="run")], "bias_deg_per_h")
+    assert found["bias_temperature_rate_deg_per_h_s_per_K"].value == pytest.approx(-56.0, rel=5e-3)
+
+
 @pytest.mark.parametrize("column", ["frequency_Hz", "housing_temperature_degC"])
 def test_what_is_no_rate_is_not_judged_as_the_bias(folder, capsys, column):
     status, _, said = judged(capsys, folder, ("cycle",), "--output", column)
@@ -206,11 +215,16 @@ def test_a_column_without_values_is_none(folder, capsys):
 
 
 def test_a_limit_without_a_record_is_said_and_leaves_the_verdict_open(folder, capsys):
-    path = limits(folder, "run_down_time_s = 500\nscale_factor_error_ppm = 100")
+    path = limits(folder, "run_down_time_s = 500\nscale_factor_error_ppm = 100\nscale_factor_asymmetry_ppm = 100")
     status, found, said = judged(capsys, folder, ("rundown",), "--limits", path)
     assert status == 0
     assert found["verdict"] == "incomplete"
     assert "limits scale_factor_error_ppm, but no record gives it; it needs a record with rate_deg_per_s" in said
+    page = folder / "missing.html"
+    assert main(["acceptance", "free-dome", str(folder / "rundown.csv"), "--limits", path, "--report", str(page)]) == 0
+    assert (
+        "scale factor error; scale factor asymmetry, positive minus negative rates" in page.read_text()
+    )  # two of them
 
 
 @pytest.mark.parametrize(
