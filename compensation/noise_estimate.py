@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.noise import Noise
@@ -22,6 +24,8 @@ USUAL, SPREAD = -1.0, 3.0
 STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 2
 LONGEST, CLOSE = 3.0, 1e-5  # of a step in ln of a level, and fall of −2 ln L that the last one promises
 MOST_STEPS, MOST_HALVINGS = 50, 12
+NEAR, STRAIGHT = 0.1, 1e-3
+"""Promised fall from which the slope's turn by a step tells its curvature, and the least part of the old one that it may tell."""
 LOUD = 1.0  # ln of slow noise within a run over that of a row, beyond which its kinds are searched each for itself
 STOOD = 0.1
 """Fall of −2 ln L up to which a search has ended where it began: every kind was searched when that was found."""
@@ -66,9 +70,9 @@ def estimate_noise(
         for start in _other_slow(found[1], free):  # what is slow may be of another kind than where the search ended
             there = plain(start)
             if start.max() > LOUD or there[0] < found[0]:
-                found = min(found, _newton(plain, start, there), key=lambda one: one[0])
+                found = min(found, _newton(plain, start, there, found[0]), key=lambda one: one[0])
     if found[1][0] < WHITE - TOO_QUIET:  # slow noise that stands for the scatter of rows may only be a lesser optimum
-        found = min(found, _newton(plain, usual, plain(usual)), key=lambda one: one[0])
+        found = min(found, _newton(plain, usual, plain(usual), found[0]), key=lambda one: one[0])
     if "markov" not in kinds:
         return plain.noise(found[1])
     return _with_correlated(plain, found, near)
@@ -128,12 +132,12 @@ class _Levels:
         low, high = np.array(ends).T
         return low, high
 
-    def likelihood(self, noise: Noise) -> Seen:
-        """Return −2 ln L of the rows and of what is within them, with slopes and curvature by ln of every kind."""
-        seen = [self.rows.deviance(self.rest, self.columns, self.precision, noise, self.mean)]
-        seen += [one.deviance(noise) for one in self.inner]
-        value, slopes, curvature = (sum(own[1:], own[0]) for own in zip(*seen, strict=True))
-        return float(value), slopes, curvature
+    def likelihood(self, noise: Noise) -> tuple[float, Array, Array, Array]:
+        """Return −2 ln L of the rows and of what is within them, with the parts of its slopes and its curvature by ln of every kind."""
+        told = [self.rows.deviance(self.rest, self.columns, self.precision, noise, self.mean)]
+        told += [one.deviance(noise) for one in self.inner]
+        value, expected, seen, curvature = (sum(own[1:], own[0]) for own in zip(*told, strict=True))
+        return float(value), expected, seen, curvature
 
     @cached_property
     def _ways(self) -> tuple[list[int], Array, list[str], Array]:
@@ -148,17 +152,34 @@ class _Levels:
     def __call__(self, x: Array) -> Seen:
         noise = self.noise(x)
         try:
-            total, slopes, curvature = self.likelihood(noise)
+            total, expected, seen, curvature = self.likelihood(noise)
         except np.linalg.LinAlgError:  # levels so far apart that rounding decides
             return np.inf, x, np.eye(len(x))
         places, along, slow, ways = self._ways
-        slope = slopes[places]
-        bend = curvature[places][:, places] + np.diag(2 * np.maximum(slope, 0.0))  # Σ goes with θ²
+        slope = (expected - seen)[places]
+        bend = _bent(curvature[places][:, places], expected[places], seen[places], along[:, 0] > 0)
         surprise = np.array(_surprises(self.rows, noise, slow, self.stated))
         slope = slope @ along + 2 * surprise @ ways
         bend = along.T @ bend @ along + 2 * ways.T @ ways
         total += float(surprise @ surprise)
         return total + 2.0 * price_of(noise, self.stated), slope, bend
+
+
+def _bent(bend: Array, expected: Array, seen: Array, is_level: NDArray[np.bool_]) -> Array:
+    """Return a curvature by ln θ whose step leads far: −2 ln L = e ln θ² + s/θ² of one level alone is least after ln(s/e)/2, the slope e − s over twice the logarithmic mean of both."""
+    ratio = np.maximum(expected, 1e-300) / np.maximum(seen, 1e-300)
+    mean = np.where(is_level, scipy.special.exprel(np.log(ratio)), 1.0)  # logarithmic mean over what is seen
+    less = np.sqrt(np.minimum(mean, 1.0))
+    more = np.where(is_level, seen * np.maximum(mean - 1.0, 0.0), np.maximum(expected - seen, 0.0))
+    return np.asarray(bend * np.outer(less, less) + np.diag(2.0 * more))
+
+
+def _by_last_step(bend: Array, moved: Array, turned: Array) -> Array:
+    """Return a curvature that explains how the last step turned the slope (BFGS); along a step of none or of a ridge it stays."""
+    along = bend @ moved
+    if turned @ moved < STRAIGHT * (along @ moved):
+        return bend
+    return np.asarray(bend - np.outer(along, along) / (along @ moved) + np.outer(turned, turned) / (turned @ moved))
 
 
 def _newton(objective: _Levels, x: Array, seen: Seen, below: float = np.inf) -> tuple[float, Array]:
@@ -181,7 +202,8 @@ def _newton(objective: _Levels, x: Array, seen: Seen, below: float = np.inf) -> 
             step /= 2
         else:
             break
-        x, (value, slope, bend) = tried, there
+        known = _by_last_step(there[2], tried - x, there[1] - slope) if promised < NEAR else there[2]
+        x, (value, slope, bend) = tried, (*there[:2], known)
     return value, x
 
 

@@ -180,11 +180,11 @@ class NoiseRows:
 
     def deviance(
         self, target: Array, columns: Array, precision: Array, noise: Noise, mean: Array | None = None
-    ) -> tuple[float, Array, Array]:
-        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean, its slopes by ln θ of the `UNKNOWNS`, and their curvature.
+    ) -> tuple[float, Array, Array, Array]:
+        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean, the two parts of its slopes by ln θ of the `UNKNOWNS`, and their curvature.
 
-        With Σ_θ = θ ∂Σ/∂θ, V⁻¹ = Σ⁻¹ − U Uᵀ, U = Σ⁻¹ X C, C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, and v = Σ⁻¹ times what is left: tr V⁻¹Σ_θ − vᵀΣ_θ v,
-        and vᵀΣ_θ V⁻¹ Σ_φ v, the mean of observed and expected information (Johnson & Thompson 1995, J. Dairy Sci. 78, 449).
+        With Σ_θ = θ ∂Σ/∂θ, V⁻¹ = Σ⁻¹ − U Uᵀ, U = Σ⁻¹ X C, C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, and v = Σ⁻¹ times what is left: tr V⁻¹Σ_θ, what is expected
+        of the noise, less vᵀΣ_θ v, what is seen; and vᵀΣ_θ V⁻¹ Σ_φ v, the mean of observed and expected information (Johnson & Thompson 1995, J. Dairy Sci. 78, 449).
         """
         whitener = self._factor(noise)
         white, total = whitener(np.column_stack([columns, target])), whitener.log_determinant
@@ -198,26 +198,28 @@ class NoiseRows:
         total += float(rest @ rest + (found - about) @ (precision * (found - about)))
         total += 2 * float(np.log(np.diag(root)).sum())
         both, levels = np.column_stack([beside, rest]), level_slopes(noise)
-        slopes, moved = np.zeros(len(UNKNOWNS)), np.zeros((len(rest), len(UNKNOWNS)))
+        expected, seen = np.zeros((2, len(UNKNOWNS)))
+        moved = np.zeros((len(rest), len(UNKNOWNS)))
         for (K, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
-            S = len(runs) * scipy.linalg.lapack.dlauum(K, lower=1)[0]  # of V⁻¹ − v vᵀ the lower half
+            S = len(runs) * scipy.linalg.lapack.dlauum(K, lower=1)[0]  # of V⁻¹ the lower half
             wide = self.stretch[runs[0]] / self.spans[runs[0]]
             correlated = self._correlated(runs[0], noise)
             theirs = levels[: 4 + len(correlated)]
             for run in runs:
                 U = multiply_lower(K, both[self.slices[run]], transposed=True)
-                S = scipy.linalg.blas.dsyrk(-1.0, U, beta=1.0, c=S, lower=1)
+                S = scipy.linalg.blas.dsyrk(-1.0, U[:, :-1], beta=1.0, c=S, lower=1)
                 v = U[:, -1]
                 own = np.empty((len(v), len(theirs)), order="F")
                 for k, column in enumerate((wide * v, F @ v, W @ v, v.sum(), *(M @ v for M in correlated))):
                     own[:, k] = column
+                seen[: len(theirs)] += theirs * (v @ own)
                 moved[self.slices[run], : len(theirs)] = multiply_lower(K, own * theirs)
             diagonal = S.diagonal()
             # Sᵀ as it lies in memory: the covariances are symmetric
             f, w, *m = (2 * np.vdot(S.T, own) - diagonal @ own.diagonal() for own in (F, W, *correlated))
-            slopes[: len(theirs)] += theirs * np.array([diagonal @ wide, f, w, 2 * S.sum() - diagonal.sum(), *m])
+            expected[: len(theirs)] += theirs * np.array([diagonal @ wide, f, w, 2 * S.sum() - diagonal.sum(), *m])
         told = beside.T @ moved
-        return total, slopes, moved.T @ moved - told.T @ told
+        return total, expected, seen, moved.T @ moved - told.T @ told
 
     def _correlated(self, run: int, noise: Noise) -> tuple[Array, ...]:
         """Covariance of the rows of a run by correlated noise of rms 1, and its slope by ln of its time; none without such noise."""

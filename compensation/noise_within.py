@@ -30,17 +30,18 @@ class Within:
     products: Array
     by_level: Array
 
-    def deviance(self, noise: Noise) -> tuple[float, Array, Array]:
-        """Return −2 ln L (see the module), its slopes by ln θ of the `UNKNOWNS`, and their expected curvature."""
+    def deviance(self, noise: Noise) -> tuple[float, Array, Array, Array]:
+        """Return −2 ln L (see the module), what is expected less what is seen for its slopes by ln θ of the `UNKNOWNS`, and their expected curvature."""
         squares = np.array([getattr(noise, kind) for kind in KINDS]) ** 2
         correlated = _correlated(len(self.products) + 1, self.span, noise.markov_time)
         by_level = np.concatenate([self.by_level, correlated])
         inverse = np.linalg.inv(np.tensordot(squares, by_level[:-1], 1))
         ways = level_slopes(noise)[:, None, None] * (inverse @ by_level)  # C⁻¹ ∂C/∂ln θ
         told = inverse @ self.products
-        slopes = self.count * np.trace(ways, axis1=1, axis2=2) - np.einsum("aij,ji->a", ways, told)
+        expected, seen = self.count * np.trace(ways, axis1=1, axis2=2), np.einsum("aij,ji->a", ways, told)
         curvature = self.count * np.einsum("aij,bji->ab", ways, ways)
-        return float(np.trace(told) - self.count * np.linalg.slogdet(inverse)[1]), slopes, curvature
+        value = float(np.trace(told) - self.count * np.linalg.slogdet(inverse)[1])
+        return value, expected, seen, curvature
 
 
 def within(rows: NoiseRows, target: Array, columns: Array) -> list[Within]:
