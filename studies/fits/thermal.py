@@ -12,7 +12,6 @@ import numpy as np
 import scipy
 
 from compensation.arrays import Array
-from compensation.noise import white_rms
 from studies.calibration.estimates import TOLD, find_groups
 from studies.calibration.fit import fit
 from studies.calibration.priors import from_standard
@@ -27,8 +26,11 @@ from studies.inference.heat_path import (
     SURE_SHARE,
     WORTH,
     HeatPath,
+    by_thermometer,
     cubic_of,
     find_heat_path,
+    is_read,
+    left_rms,
     slow_share,
 )
 from studies.inference.polynomial_card import polynomial_card
@@ -71,7 +73,7 @@ class ThermalFit:
     @property
     def residual_rms(self) -> float:
         """Rms of what is left of the block averages about the mean of each run, Hz: slow noise carries the level off."""
-        return float(np.sqrt(np.mean(np.concatenate([rest - rest.mean() for _, rest in self.left]) ** 2)))
+        return left_rms(self.path.fit)
 
     @property
     def slow(self) -> float:
@@ -80,11 +82,8 @@ class ThermalFit:
 
     @property
     def by_thermometer(self) -> float:
-        """What the noise σ of the housing's readings, rows h apart, makes of the frequency behind the first lag: f₀a₁ σ √(h/2τ), Hz."""
-        runs, tau = self.path.fit.problem.runs, self.path.value("law.lag_s")[0]
-        read = [(white_rms(driving(run.record)), float(np.median(np.diff(run.record["time_s"])))) for run in runs]
-        slope = abs(self.path.value("law.f0_Hz")[0] * self.path.value("law.a1_per_K")[0])
-        return slope * float(np.sqrt(np.mean([sigma**2 * h / (2.0 * tau) for sigma, h in read])))
+        """What the noise of the housing's readings makes of the frequency, Hz."""
+        return by_thermometer(self.path.fit)
 
     @property
     def negative(self) -> list[str]:
@@ -131,7 +130,7 @@ def fit_thermal_constants(
 
     path = find(law | {"delay_s": {"value": 0.0, "sd": 0.0}})
     share, error = path.value(SHARE)
-    if lags is None and (abs(share) > SURE_SHARE * error or slow_share(path.fit) > FOLLOWED):
+    if lags is None and not is_read(path.fit) and (abs(share) > SURE_SHARE * error or slow_share(path.fit) > FOLLOWED):
         # Seconds by which a sensor or a clock is late look like radiation, or like slow noise.
         late = find(law)
         path = late if late.evidence > path.evidence + WORTH else path

@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from compensation.arrays import Array
+from compensation.noise import white_rms
 from studies.calibration.fit import CardFit, fit
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem
@@ -16,6 +17,7 @@ from studies.inference.generic_forms import any_lags
 from studies.inference.housing import evidence_of, set_housing_apart
 from studies.inference.hypothesis import Hypothesis
 from studies.inference.linear import PRICE, Linear, Shapes
+from studies.inference.records import driving
 from studies.inference.search import Search
 from studies.inference.signatures import SHARE, Signatures
 from studies.instrument.card import Instrument
@@ -54,6 +56,8 @@ WORTH = 10.0
 """Log evidence that one more lag must bring."""
 FOLLOWED = 3.0
 """Slow noise within a run over that of a row, up to which no more is asked of a path."""
+READ = 1.5
+"""Times what the noise of the housing's readings makes, up to which what is left is that."""
 STRAINED = 0.01
 """Chance below which values of a card's heat path are so far from it that they may stand for a part that it lacks."""
 SURE_SHARE = 3.0
@@ -193,6 +197,8 @@ def find_heat_path(
             progress(words)
             path = max((_calibrated(lean, card) for card in cards), key=lambda one: one.evidence)
             if number == 1 and lags is None and slow_share(path.fit) > FOLLOWED:
+                if is_read(path.fit):
+                    return path
                 grows = _calibrated(lean, with_lags(whole.instrument, [lag], True))
                 path = grows if grows.evidence > path.evidence + WORTH else path
             if is_ahead(path.fit) or slow_share(path.fit) > FOLLOWED:
@@ -249,6 +255,26 @@ def effects_would_bring(search: Search) -> float:
 def _best(search: Search, bank: Sequence[Shapes], beside: Hypothesis | None = None) -> float:
     now = beside or Hypothesis((), search.noise, 0.0)
     return max((one.gain for one in search.scan(now, bank)), default=-np.inf)
+
+
+def left_rms(found: CardFit) -> float:
+    """Rms of the frequency that a fit leaves, Hz, about the mean of each run: slow noise carries the level off."""
+    rest = found.state.residual[FREQUENCY]
+    return float(np.sqrt(np.mean(np.concatenate([rest[s] - rest[s].mean() for s in found.rows[FREQUENCY].slices]) ** 2)))
+
+
+def by_thermometer(found: CardFit) -> float:
+    """Return what the noise σ of the housing's readings, rows h apart, makes of the frequency behind the first lag: f₀a₁ σ √(h/2τ), Hz."""
+    priors, runs = found.problem.priors, [driving(run.record) for run in found.problem.runs]
+    at = priors.at(found.point[: len(priors.values)])
+    rows = [float(np.median(np.diff(run.record["time_s"]))) for run in found.problem.runs]
+    made = np.mean([white_rms(read) ** 2 * h / (2.0 * at[f"law.{LAGS[0]}"]) for read, h in zip(runs, rows, strict=True)])
+    return float(abs(at["law.f0_Hz"] * at["law.a1_per_K"]) * np.sqrt(made))
+
+
+def is_read(found: CardFit) -> bool:
+    """Whether a path of one lag leaves no more than the noise of the housing's readings makes: a longer path would follow the frequency closer only for smoothing that."""
+    return left_rms(found) < READ * by_thermometer(found)
 
 
 def slow_share(found: CardFit, name: str = FREQUENCY) -> float:
