@@ -147,7 +147,8 @@ def measure(found: Inferred, reference: float | None) -> dict[str, Measured]:
         if 0.0 < after < LITTLE**2 * before:  # the prior has its mean where u is 0
             variance = 1.0 / (1.0 / after - 1.0 / before)
             mean = value + float(J @ coordinates) * variance / before
-            out[name] = Measured(mean, float(np.sqrt(variance)), after < KNOWN**2 * before, before**0.5)
+            left_open = before**0.5 if card.polynomial is None else 0.0
+            out[name] = Measured(mean, float(np.sqrt(variance)), after < KNOWN**2 * before, left_open)
     return out
 
 
