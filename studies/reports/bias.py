@@ -50,7 +50,7 @@ def facts(study: BiasStudy, method: Method) -> Facts:
     count = f"of {len(POWERS if judged.fit.memory.play else TERMS)} candidates; the HRG paper selects {len(SELECTED_BY_THE_PAPER)}"
     ends = {name: to_interval(*own) for name, own in judged.fit.memory_intervals.items()}
     memory = [
-        (label, f"{ends[name][0]} {per}", f"90 %: {ends[name][1]} … {ends[name][2]} {per}")
+        (label, f"{ends[name][0]} {per}", f"90 % with these terms: {ends[name][1]} … {ends[name][2]} {per}")
         for name, (label, per) in MEMORY.items()
         if name in ends
     ]
@@ -160,7 +160,7 @@ def coefficients_table(judged: Judged, output: str) -> Table:
     unit = fit.variable.unit
     per, words = (60.0, "K/min") if unit == "°C" else (1.0, f"{unit}/s")
     (low, high), (slow, fast) = widen(*fit.state_range), (plain(per * end) for end in widen(*fit.rate_range))
-    note = f"Valid from {plain(low, 8)} to {plain(high, 8)} {unit} and from {slow} to {fast} {words}, a little beyond the data. Whiteness of the residual: θ = {fit.theta:.3f} (1: white, 0: random walk)."
+    note = f"Valid from {plain(low, 8)} to {plain(high, 8)} {unit} and from {slow} to {fast} {words}, a little beyond the data. Whiteness of the residual: θ = {fit.theta:.3f} (1: white, 0: random walk). Errors are with these terms: how their choice scatters from campaign to campaign is not in them."
     if judged.method == "guarded" and fit.theta < 0.99:
         note += " The errors include the drift of the bias."
     return Table(f"Coefficients, {METHOD[judged.method]}", rows, COEFFICIENTS, note)
