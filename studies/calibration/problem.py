@@ -281,20 +281,22 @@ CARE = 2.0  # times what the card's time constant makes of a rate: it may be tha
 
 
 def start_spread(run: ObservedRun, instrument: "Instrument", law: "FrequencyLaw") -> float:
-    """Prior standard deviation (K) of what each part departs from rest at the start of a run: a frequency that stands still has come to rest, whatever the housing does next."""
+    """Prior standard deviation (K) of what each part departs from rest at the start of a run."""
     if "frequency_Hz" not in run.responses:
         return MOST_SPREAD
     reference = instrument.reference_temperature
     lag = slowest_lag(build_network(instrument, boundary="housing"), reference)
     below, above = law.frequency(np.array([reference - 1.0, reference + 1.0]))
     frequency = run.responses["frequency_Hz"]
-    rate = _first_rate(frequency.time, frequency.value, WINDOW * lag) / abs(float(above - below) / 2)
-    return float(np.clip(CARE * lag * rate, LEAST_SPREAD, MOST_SPREAD))
+    rates = [_rate(frequency.time, frequency.value, WINDOW * lag) / abs(float(above - below) / 2)]
+    if run.inner.boundary == "housing":
+        rates.append(_rate(run.inner.profile.time, run.inner.profile.value, WINDOW * lag))
+    return float(np.clip(CARE * lag * max(rates), LEAST_SPREAD, MOST_SPREAD))
 
 
-def _first_rate(time: Array, value: Array, window: float) -> float:
-    """Rate (per s) at the first row that the first rows leave likely, rms: of a parabola through them, for a chamber may step there, and of its noise."""
+def _rate(time: Array, value: Array, window: float) -> float:
+    """Rate (per s) that the first rows leave likely, rms: of a straight line through them, and of its noise."""
     count = min(max(int(np.searchsorted(time - time[0], window)), LEAST_ROWS), len(time))
-    bent = np.vander((time[:count] - time[0]) / window, min(3, count), increasing=True)
-    inverse = np.linalg.pinv(bent)
-    return float(np.hypot(inverse[1] @ value[:count], white_rms(value) * np.linalg.norm(inverse[1]))) / window
+    t = time[:count] - time[:count].mean()
+    spread = white_rms(value)
+    return float(np.hypot(t @ value[:count] / (t @ t), spread / np.sqrt(t @ t)))
