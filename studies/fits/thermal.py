@@ -130,7 +130,8 @@ def fit_thermal_constants(
 
     path = find(law | {"delay_s": {"value": 0.0, "sd": 0.0}})
     share, error = path.value(SHARE)
-    if lags is None and not is_read(path.fit) and (abs(share) > SURE_SHARE * error or slow_share(path.fit) > FOLLOWED):
+    wanders = slow_share(path.fit) > FOLLOWED and not is_read(path.fit)
+    if lags is None and (abs(share) > SURE_SHARE * error or wanders):
         # Seconds by which a sensor or a clock is late look like radiation, or like slow noise.
         late = find(law)
         path = late if late.evidence > path.evidence + WORTH else path

@@ -56,7 +56,7 @@ WORTH = 10.0
 """Log evidence that one more lag must bring."""
 FOLLOWED = 3.0
 """Slow noise within a run over that of a row, up to which no more is asked of a path."""
-READ = 1.5
+READ = 4.0
 """Times what the noise of the housing's readings makes, up to which what is left is that."""
 STRAINED = 0.01
 """Chance below which values of a card's heat path are so far from it that they may stand for a part that it lacks."""
@@ -196,19 +196,18 @@ def find_heat_path(
         if path is None:
             progress(words)
             path = max((_calibrated(lean, card) for card in cards), key=lambda one: one.evidence)
-            if number == 1 and lags is None and slow_share(path.fit) > FOLLOWED:
-                if is_read(path.fit):
-                    return path
-                grows = _calibrated(lean, with_lags(whole.instrument, [lag], True))
-                path = grows if grows.evidence > path.evidence + WORTH else path
-            if is_ahead(path.fit) or slow_share(path.fit) > FOLLOWED:
-                progress(f"{words}, its sensor late")
-                path = max(path, _calibrated(lean, with_late_sensor(path.card)), key=lambda one: one.evidence)
+            if not is_read(path.fit):
+                if number == 1 and lags is None and slow_share(path.fit) > FOLLOWED:
+                    grows = _calibrated(lean, with_lags(whole.instrument, [lag], True))
+                    path = grows if grows.evidence > path.evidence + WORTH else path
+                if is_ahead(path.fit) or slow_share(path.fit) > FOLLOWED:
+                    progress(f"{words}, its sensor late")
+                    path = max(path, _calibrated(lean, with_late_sensor(path.card)), key=lambda one: one.evidence)
             tried[number, lumps] = path
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
             still = number == 1 or slow_share(path.fit) < FOLLOWED
-            followed = still and lags_would_bring(_linearised(path.fit)) < WORTH
+            followed = is_read(path.fit) or (still and lags_would_bring(_linearised(path.fit)) < WORTH)
     assert best is not None
     if whole.responses == lean.responses or not best.departs:
         return best
@@ -260,7 +259,9 @@ def _best(search: Search, bank: Sequence[Shapes], beside: Hypothesis | None = No
 def left_rms(found: CardFit) -> float:
     """Rms of the frequency that a fit leaves, Hz, about the mean of each run: slow noise carries the level off."""
     rest = found.state.residual[FREQUENCY]
-    return float(np.sqrt(np.mean(np.concatenate([rest[s] - rest[s].mean() for s in found.rows[FREQUENCY].slices]) ** 2)))
+    return float(
+        np.sqrt(np.mean(np.concatenate([rest[s] - rest[s].mean() for s in found.rows[FREQUENCY].slices]) ** 2))
+    )
 
 
 def by_thermometer(found: CardFit) -> float:
@@ -268,12 +269,14 @@ def by_thermometer(found: CardFit) -> float:
     priors, runs = found.problem.priors, [driving(run.record) for run in found.problem.runs]
     at = priors.at(found.point[: len(priors.values)])
     rows = [float(np.median(np.diff(run.record["time_s"]))) for run in found.problem.runs]
-    made = np.mean([white_rms(read) ** 2 * h / (2.0 * at[f"law.{LAGS[0]}"]) for read, h in zip(runs, rows, strict=True)])
+    made = np.mean(
+        [white_rms(read) ** 2 * h / (2.0 * at[f"law.{LAGS[0]}"]) for read, h in zip(runs, rows, strict=True)]
+    )
     return float(abs(at["law.f0_Hz"] * at["law.a1_per_K"]) * np.sqrt(made))
 
 
 def is_read(found: CardFit) -> bool:
-    """Whether a path of one lag leaves no more than the noise of the housing's readings makes: a longer path would follow the frequency closer only for smoothing that."""
+    """Whether a path leaves no more than the noise of the housing's readings makes: a longer one would follow the frequency closer only for smoothing that."""
     return left_rms(found) < READ * by_thermometer(found)
 
 

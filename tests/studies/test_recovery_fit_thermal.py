@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.constants import Stefan_Boltzmann
 
+from compensation.memory import follow_lag
 from studies.cli import main
 from studies.errors import InputError
 from studies.fits.thermal import fit_thermal_constants
@@ -114,6 +115,24 @@ def test_rows_far_apart_find_the_lag_of_a_smooth_housing_and_whose_noise_is_left
     assert tau["low"] < 1200.0 < tau["high"]
     assert slope["low"] < 4432.0 * (8e-5 + 2 * 5e-8 * (5.0 - 20.0)) < slope["high"]
     assert "noise of the housing's readings alone makes" in said
+
+
+@pytest.mark.parametrize("second", [0.0, 300.0])
+def test_noise_of_the_housing_in_one_run_is_no_further_lag(second):
+    """Planted: a housing 1500 s behind one step, read to 10 mK; what its noise makes of the prediction was followed by a start of 28 K, a lag too many and 0.21 for 0.33 Hz/K."""
+    t, rng = np.arange(0.0, 18000.0, 10.0), np.random.default_rng(102)
+    housing = -20.0 + 45.0 * np.exp(-t / 1500.0)
+    x = follow_lag(housing, 10.0, 900.0)
+    x = follow_lag(x, 10.0, second) if second else x
+    columns = {"time_s": t, "housing_temperature_degC": housing + 0.01 * rng.standard_normal(t.size)}
+    columns["frequency_Hz"] = 5210.0 + 0.31 * x - 6e-4 * x**2 + 2e-5 * rng.standard_normal(t.size)
+    found = fit_thermal_constants([Record(columns)]).estimates
+    assert [name for name in found if name.startswith("time_constant")] == ["time_constant_1", "time_constant_2"][
+        : 1 + bool(second)
+    ]
+    slope = found["slope"]
+    assert slope.value == pytest.approx(0.31 - 2 * 6e-4 * 2.5, abs=5.0 * (slope.high - slope.low) / 3.29)
+    assert slope.high - slope.low < 0.01
 
 
 @pytest.mark.slow

@@ -42,7 +42,9 @@ def test_a_device_without_a_card_is_read_at_20_degC_with_what_was_found(tmp_path
         found = answer.measured[name]
         assert abs(found.value - true) < 4.0 * found.sd
     assert not any(name.startswith("law.a") for name in answer.measured)
-    assert not any(one.open for one in answer.measured.values())  # what no card says is no scale for the scatter of a lot
+    assert not any(
+        one.open for one in answer.measured.values()
+    )  # what no card says is no scale for the scatter of a lot
 
 
 def test_a_set_of_one_device_is_closed_by_another():
