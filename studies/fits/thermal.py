@@ -29,7 +29,7 @@ from studies.inference.heat_path import (
     by_thermometer,
     cubic_of,
     find_heat_path,
-    is_read,
+    leaves_thermometer_noise,
     left_rms,
     slow_share,
 )
@@ -130,7 +130,7 @@ def fit_thermal_constants(
 
     path = find(law | {"delay_s": {"value": 0.0, "sd": 0.0}})
     share, error = path.value(SHARE)
-    wanders = slow_share(path.fit) > FOLLOWED and not is_read(path.fit)
+    wanders = slow_share(path.fit) > FOLLOWED and not leaves_thermometer_noise(path.fit)
     if lags is None and (abs(share) > SURE_SHARE * error or wanders):
         # Seconds by which a sensor or a clock is late look like radiation, or like slow noise.
         late = find(law)

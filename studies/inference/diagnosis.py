@@ -32,9 +32,9 @@ from studies.inference.heat_path import (
     effects_would_bring,
     find_heat_path,
     is_ahead,
-    is_read,
     is_strained,
     lags_would_bring,
+    leaves_thermometer_noise,
     slow_share,
     with_second_mass,
 )
@@ -232,7 +232,7 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     """Search beside the path of the card, or one lag, and where that leaves slow noise of which other lags would take something, strains the card's values, or the sensor is late, beside a longer one; the likelier heat path stays."""
     own, given, path = Pursuit(found, progress), whole.problem.instrument.polynomial is None, None
     tried: dict[tuple[int, bool], HeatPath] = {}
-    left = slow_share(found) > SUSPICIOUS and (given or not is_read(found))
+    left = slow_share(found) > SUSPICIOUS and (given or not leaves_thermometer_noise(found))
     bring = lags_would_bring(own.search) if left else -np.inf
     ended = None
     if not (given or is_ahead(found)) and bring > WORTH and effects_would_bring(own.search) > bring:

@@ -56,7 +56,7 @@ WORTH = 10.0
 """Log evidence that one more lag must bring."""
 FOLLOWED = 3.0
 """Slow noise within a run over that of a row, up to which no more is asked of a path."""
-READ = 4.0
+THERMOMETER = 4.0
 """Times what the noise of the housing's readings makes, up to which what is left is that."""
 STRAINED = 0.01
 """Chance below which values of a card's heat path are so far from it that they may stand for a part that it lacks."""
@@ -196,7 +196,7 @@ def find_heat_path(
         if path is None:
             progress(words)
             path = max((_calibrated(lean, card) for card in cards), key=lambda one: one.evidence)
-            if not is_read(path.fit):
+            if not leaves_thermometer_noise(path.fit):
                 if number == 1 and lags is None and slow_share(path.fit) > FOLLOWED:
                     grows = _calibrated(lean, with_lags(whole.instrument, [lag], True))
                     path = grows if grows.evidence > path.evidence + WORTH else path
@@ -207,7 +207,7 @@ def find_heat_path(
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
             still = number == 1 or slow_share(path.fit) < FOLLOWED
-            followed = is_read(path.fit) or (still and lags_would_bring(_linearised(path.fit)) < WORTH)
+            followed = leaves_thermometer_noise(path.fit) or (still and lags_would_bring(_linearised(path.fit)) < WORTH)
     assert best is not None
     if whole.responses == lean.responses or not best.departs:
         return best
@@ -275,9 +275,9 @@ def by_thermometer(found: CardFit) -> float:
     return float(abs(at["law.f0_Hz"] * at["law.a1_per_K"]) * np.sqrt(made))
 
 
-def is_read(found: CardFit) -> bool:
+def leaves_thermometer_noise(found: CardFit) -> bool:
     """Whether a path leaves no more than the noise of the housing's readings makes: a longer one would follow the frequency closer only for smoothing that."""
-    return left_rms(found) < READ * by_thermometer(found)
+    return left_rms(found) < THERMOMETER * by_thermometer(found)
 
 
 def slow_share(found: CardFit, name: str = FREQUENCY) -> float:
