@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compensation.arrays import Array
+from compensation.noise import white_rms
 from studies.calibration.ahead import spread_of_prediction
 from studies.calibration.fit import covariance_at, descend, fit
 from studies.calibration.observed import MOST_BLOCKS, RESPONSES, observe
@@ -49,6 +50,16 @@ class Start:
         found = predict(instrument, drive, [INITIAL + part for part in self.departures], law)
         slopes = {c: [found.derivatives[INITIAL + part][c] for part in self.departures] for c in found.columns}
         return {c: np.asarray(np.linalg.norm(np.transpose(J) @ self.root, axis=1)) for c, J in slopes.items()}
+
+
+def misread(instrument: "Instrument", drive: "Drive", law: "FrequencyLaw") -> dict[str, float]:
+    """Return what the noise of the housing's readings, which drive a run, makes of every column, rms: as one draw of it does."""
+    read = drive.profile.value
+    noise = white_rms(read) if drive.boundary == "housing" else 0.0
+    draw = np.append(0.0, np.random.default_rng(0).standard_normal(len(read) - 1))
+    drawn = replace(drive.profile, value=read + noise * draw)
+    alone, other = (predict(instrument, one, law=law).columns for one in (drive, replace(drive, profile=drawn)))
+    return {column: float(np.sqrt(np.mean((other[column] - own) ** 2))) for column, own in alone.items()}
 
 
 def begin(

@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from compensation.arrays import Array
 from studies.calibration.ahead import spread_of_prediction
-from studies.calibration.start import begin
+from studies.calibration.start import begin, misread
 from studies.cli.arguments import POSITIVE, PROFILE, Card, Out, Seed, Theory
 from studies.cli.output import answers, keep_record, say
 from studies.instrument.card import load_card
@@ -23,7 +23,7 @@ DRIVES = (
 )
 
 UNCERTAINTY = "Uncertainty of the prediction (standard deviation, rms over the run)"
-SPREAD = "0: column | 1: in all .3 | 2: by its start .3"
+SPREAD = "0: column | 1: in all .3 | 2: by its start .3 | 3: by noise of the housing's readings .3"
 BEGUN = "How the run began: departures from having settled"
 DEPARTURES = "0: part | 1: departure (K) .3 | 2: standard deviation (K) .3"
 
@@ -55,7 +55,7 @@ def simulate(
         row: Time between rows in s; a record keeps its rows.
         noiseless: Leave out noise, sensor lag and rounding.
         boundary: Column of a record that is imposed: chamber or housing.
-        spread: Show the standard deviation of every column due to the uncertainties of the card, how the run of a record began and, as a calibration found it, the level of a run, without noise.
+        spread: Show the standard deviation of every column due to the uncertainties of the card, how the run of a record began, the noise of its temperatures and, as a calibration found it, the level of a run, without noise of the column.
         start: Time of a record (30min, 2h) whose readings tell how its gyro began; else it begins settled at the first temperature.
     """
     instrument = load_card(card)
@@ -67,12 +67,14 @@ def simulate(
     for warning in run.warnings:
         say(f"warning: {warning}")
     keep_record(run.record, out)
-    widths: list[tuple[str, float, float]] = []
+    widths: list[tuple[str, float, float, float]] = []
     if spread:
         by_card = spread_of_prediction(instrument, run.prediction.drive, run.law)
         by_start = begun.spread(instrument, run.prediction.drive, run.law) if begun else {}
-        both = {name: (_rms(own), _rms(by_start.get(name, 0.0))) for name, own in by_card.items() if name in run.record}
-        widths = [(name, float(np.hypot(own, start_alone)), start_alone) for name, (own, start_alone) in both.items()]
+        by_readings = misread(instrument, run.prediction.drive, run.law) if begun else {}
+        for name in [name for name in by_card if name in run.record]:
+            parts = _rms(by_card[name]), _rms(by_start.get(name, 0.0)), by_readings.get(name, 0.0)
+            widths.append((name, float(np.linalg.norm(parts)), *parts[1:]))
     summary = {
         "card": instrument.name,
         "out": out,
@@ -86,7 +88,7 @@ def simulate(
         else None,
         **row_of(run.law, solver_relative_error="solver_error", interpolation_relative_error="interpolation_error"),
         "start": begun and {part: {"departure_K": value, "sd_K": sd} for part, value, sd in begun.rows},
-        "spread": {name: width for name, width, _ in widths} if spread else None,
+        "spread": {name: width for name, width, *_ in widths} if spread else None,
         "warnings": run.warnings,
     }
     solved = f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error {run.law.solver_error:.0e}, both relative."

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.calibration.start import find_start
+from studies.calibration.start import find_start, misread
 from studies.cli import main
 from studies.instrument.card import load_card
 from studies.record import Record, read_record, write_record
@@ -97,3 +97,15 @@ def test_the_command_says_how_a_run_began(run, tmp_path, capsys, refuse):
     assert "fewer than 5 means" in refuse([*words, "--start", "10s"])
     profile = ["simulate", "hrg-30mm", "step 20 0 1h", "--out", str(out), "--start", "30min"]
     assert "begins settled" in refuse(profile)
+
+
+def test_the_width_holds_what_noise_of_the_housing_makes(card, run):
+    """Planted: 20 mK of noise in the housing's readings, another draw; the resonator behind its lag averages it."""
+    exact = drive_by_record(run[1], "housing")
+    draw = np.append(0.0, np.random.default_rng(5).standard_normal(len(run[1]) - 1))
+    noisy = run[1]["housing_temperature_degC"] + 0.02 * draw
+    drive = drive_by_record(Record(run[1].columns | {"housing_temperature_degC": noisy}), "housing")
+    law = law_for(card, drive)
+    true, read = (predict(card, one, law=law).columns["frequency_Hz"] for one in (exact, drive))
+    assert np.sqrt(np.mean((read - true) ** 2)) == pytest.approx(misread(card, drive, law)["frequency_Hz"], rel=0.5)
+    assert misread(card, exact, law)["frequency_Hz"] < 0.1 * misread(card, drive, law)["frequency_Hz"]
