@@ -17,7 +17,7 @@ from studies.inference.generic_forms import any_lags
 from studies.inference.housing import evidence_of, set_housing_apart
 from studies.inference.hypothesis import Hypothesis
 from studies.inference.linear import PRICE, Linear, Shapes
-from studies.inference.records import driving
+from studies.inference.records import HOUSING, driving
 from studies.inference.search import Search
 from studies.inference.signatures import SHARE, Signatures
 from studies.instrument.card import Instrument
@@ -258,20 +258,17 @@ def _best(search: Search, bank: Sequence[Shapes], beside: Hypothesis | None = No
 
 def left_rms(found: CardFit) -> float:
     """Rms of the frequency that a fit leaves, Hz, about the mean of each run: slow noise carries the level off."""
-    rest = found.state.residual[FREQUENCY]
-    return float(
-        np.sqrt(np.mean(np.concatenate([rest[s] - rest[s].mean() for s in found.rows[FREQUENCY].slices]) ** 2))
-    )
+    runs = [found.state.residual[FREQUENCY][own] for own in found.rows[FREQUENCY].slices]
+    return float(np.sqrt(np.mean(np.concatenate([rest - rest.mean() for rest in runs]) ** 2)))
 
 
 def by_thermometer(found: CardFit) -> float:
     """Return what the noise σ of the housing's readings, rows h apart, makes of the frequency behind the first lag: f₀a₁ σ √(h/2τ), Hz."""
-    priors, runs = found.problem.priors, [driving(run.record) for run in found.problem.runs]
+    priors, records = found.problem.priors, [run.record for run in found.problem.runs]
     at = priors.at(found.point[: len(priors.values)])
-    rows = [float(np.median(np.diff(run.record["time_s"]))) for run in found.problem.runs]
-    made = np.mean(
-        [white_rms(read) ** 2 * h / (2.0 * at[f"law.{LAGS[0]}"]) for read, h in zip(runs, rows, strict=True)]
-    )
+    read = [white_rms(driving(record)) if HOUSING in record else 0.0 for record in records]  # a chamber does ripple
+    rows = [float(np.median(np.diff(record["time_s"]))) for record in records]
+    made = np.mean([sigma**2 * h / (2.0 * at[f"law.{LAGS[0]}"]) for sigma, h in zip(read, rows, strict=True)])
     return float(abs(at["law.f0_Hz"] * at["law.a1_per_K"]) * np.sqrt(made))
 
 
