@@ -43,7 +43,7 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
         "columns": _columns(found),
         "constraints": [
             row_of(one, "column", "limit", "value", "room", "margin", "price")
-            | {"error": float(found.errors[found.place(one.column)])}
+            | {"error": float(found.errors[found.task.place(one.column)])}
             | {"kind": "most" if one.sign > 0 else "least", "active": one.price is not None}
             for one in found.limits
         ],
@@ -84,7 +84,7 @@ def _front(found: Answer) -> list[dict[str, Any]]:
     names = found.task.study.names[: found.task.free]
     return [
         dict(zip(names, design.tolist(), strict=False))
-        | {column: shown(column, values[found.place(column)]) for column in found.task.wanted}
+        | {column: shown(column, values[found.task.place(column)]) for column in found.task.wanted}
         for design, values in zip(found.front, found.front_values, strict=True)
         if len(found.task.keys.objective) > 1
     ]
@@ -94,7 +94,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
     unit = {row["column"]: f" {row['unit']}" if row["unit"] != "1" else "" for row in payload["columns"]}
     label = {row["column"]: row["label"] for row in payload["columns"]}
     named = {column.name: column_label(column) for column in found.task.study.columns}
-    goals = [(goal.column, found.place(goal.column)) for goal in found.task.keys.objective]
+    goals = [(goal.column, found.task.place(goal.column)) for goal in found.task.keys.objective]
     facts = [(label[n], f"{plain(found.after[k])}{unit[n]}", f"before: {plain(found.before[k])}") for n, k in goals]
     reasons = Counter(reason for _, reason in found.failures)
     several = len(goals) > 1
@@ -107,7 +107,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
     doubts = [
         tell_doubt(label[name], unit[name].strip(), shown(name, found.after[k]), float(found.errors[k]), limits)
         for name in dict.fromkeys(one.column for one in found.task.keys.constraint if not one.is_relative)
-        for k, limits in [(found.place(name), [one.limit for one in found.limits if one.column == name])]
+        for k, limits in [(found.task.place(name), [one.limit for one in found.limits if one.column == name])]
     ]
     keys = found.task.study.names[: found.task.free]
     front = [Column(itemgetter(name), name.removeprefix("resonator."), digits=5) for name in keys]
@@ -172,7 +172,7 @@ def _draw_history(found: Answer) -> Drawing:
 
 
 def _draw_front(found: Answer) -> Drawing:
-    a, b = (found.place(one.column) for one in found.task.keys.objective[:2])
+    a, b = (found.task.place(one.column) for one in found.task.keys.objective[:2])
     titles = [column_label(found.task.study.columns[k]) for k in (a, b)]
     held = found.history[:, 0] == 0
     with style.figure(height=3.8, x=titles[0], y=titles[1]) as (made, axis):

@@ -1,6 +1,6 @@
 """From a task to its answer: the best design verified, the price of every limit, the front, the tolerances."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -73,11 +73,7 @@ class Answer:
     values: Array
     # evaluations, failures: how many designs were computed; the reasons of those that could not be.
     evaluations: int
-    failures: tuple[tuple[Array, str], ...] = field(default=())
-
-    def place(self, column: str) -> int:
-        """Return where a column stands."""
-        return self.task.columns.index(column)
+    failures: tuple[tuple[Array, str], ...]
 
 
 def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
@@ -100,7 +96,7 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
     others = search.local(centre, WIDE, without=best)(centre[: search.task.free])[0]
     foretold = search.goals.uncount(others)
     prices = _prices(search, scalar, smooth)
-    values, place = search.values[best], search.goals.place
+    values, place = search.values[best], task.place
     limits = tuple(
         Limit(column, sign, limit, shown(column, values[place(column)]), _margin(search, column, values), price)
         for (column, sign, limit, _), price in zip(search.goals.limits, prices, strict=True)
@@ -176,7 +172,7 @@ def _refuse_infeasible(search: Search, best: int) -> None:
     for (column, sign, limit, _), over in zip(goals.limits, goals.excess(values, search.margins), strict=True):
         if over > EXACT * abs(limit):
             unit, side = search.task.unit(column), "above" if sign > 0 else "below"
-            value = shown(column, values[goals.place(column)])
+            value = shown(column, values[search.task.place(column)])
             kept = ", its margin for tolerances included," if sign * (value - limit) < over - EXACT * abs(limit) else ""
             words.append(f"{column} = {value:.6g} {unit} is{kept} {over:.4g} {side} its limit {limit:.6g}")
     at = ", ".join(
@@ -233,7 +229,7 @@ def _unit(search: Search, scalar: Scalar, best: int) -> float:
     objectives = search.task.keys.objective
     if len(objectives) > 1:
         return 1.0
-    c = search.task.columns.index(objectives[0].column)
+    c = search.task.place(objectives[0].column)
     by_log = search.goals.logarithmic[c] and not is_magnitude(objectives[0].column)
     return float(scalar.span[0] * (abs(search.values[best][c]) if by_log else 1.0))
 
@@ -266,7 +262,7 @@ def spread_about(search: Search, best: int) -> tuple[Spread, ...]:
     around = np.vstack([search.values[known:], values])
     found = []
     for name in task.wanted:
-        c, move = task.columns.index(name), nearest[name]
+        c, move = task.place(name), nearest[name]
         column = np.abs(around[:, c]) if is_magnitude(name) else around[:, c]
         one = float(np.sum(np.abs(move) * most)), float(np.linalg.norm(move * sd))
         value = shown(name, values[c])

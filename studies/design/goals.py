@@ -76,7 +76,7 @@ class Goals:
         z = self.count(values)
         found = []
         for one in self.task.keys.objective:
-            c = self.place(one.column)
+            c = self.task.place(one.column)
             if one.target is not None:
                 found.append(abs(values[c] - one.target))
             else:
@@ -87,7 +87,7 @@ class Goals:
         """Return by how much each limit is passed with its margin, in units of its column; negative: what is left; (limits,)."""
         found = []
         for column, sign, limit, _ in self.limits:
-            c, parts = self.place(column), self.smooth(column)
+            c, parts = self.task.place(column), self.smooth(column)
             if is_magnitude(column):
                 found.append(limit - min(abs(values[c]), float(np.min(abs(values[parts]) - margins[parts]))))
             else:
@@ -98,7 +98,7 @@ class Goals:
         """Return the largest excess over limits with their margins, in spreads of its column; 0 where all is kept."""
         found = [0.0]
         for (column, sign, limit, _), over in zip(self.limits, self.excess(values, margins), strict=True):
-            c = self.place(column)
+            c = self.task.place(column)
             if self.logarithmic[c]:  # sign (v − limit) + margin = over
                 value = values[c]
                 found.append((sign * np.log(value / max(value - sign * over, 1e-300)) - EXACT) / self.spread[c])
@@ -111,7 +111,7 @@ class Goals:
         """Column, +1 for an upper and -1 for a lower one, limit, and number of the constraint."""
         found = []
         for number, one in enumerate(self.task.keys.constraint):
-            low, high = one.limits(float(self.nominal[self.place(one.column)]))
+            low, high = one.limits(float(self.nominal[self.task.place(one.column)]))
             found += [(one.column, sign, end, number) for sign, end in ((-1.0, low), (1.0, high)) if np.isfinite(end)]
         return found
 
@@ -157,11 +157,7 @@ class Goals:
         if is_magnitude(column):
             stem = column.removesuffix("_Hz") + "_of_n"
             return [k for k, name in enumerate(self.task.columns) if name.startswith(stem)]
-        return [self.place(column)]
-
-    def place(self, column: str) -> int:
-        """Return where a column stands."""
-        return self.task.columns.index(column)
+        return [self.task.place(column)]
 
 
 def reach(task: Task, moves: Array) -> float:
@@ -183,7 +179,7 @@ def reach(task: Task, moves: Array) -> float:
 
 def lay_goals(task: Task, values: Array, nominal: Array) -> Goals:
     """Return the goals of a task, scaled by the designs known so far, array (m, columns)."""
-    signed = {c for one in task.keys.objective if one.target is not None for c in [task.columns.index(one.column)]}
+    signed = {task.place(one.column) for one in task.keys.objective if one.target is not None}
     signed |= {k for k, name in enumerate(task.columns) if "separation" in name}
     positive = (values > 0).all(axis=0)
     wide = values.max(axis=0) > DECADE * np.where(positive, values.min(axis=0), np.inf)

@@ -14,8 +14,8 @@ from studies.sweeps.engine import hire
 from studies.sweeps.evaluate import WorkPlan
 from studies.sweeps.opening import claim_store
 from studies.sweeps.parameters import set_parameters
-from studies.sweeps.provenance import describe_environment, digest
-from studies.sweeps.run import describe_study, physics_of
+from studies.sweeps.provenance import digest
+from studies.sweeps.run import describe_study, physics_of, running
 from studies.sweeps.search import Explorer
 from studies.sweeps.store import Store, memory_store
 
@@ -33,18 +33,13 @@ def optimise(
     study = task.study
     plan = replace(WorkPlan.of(study), start=task.named(task.start))
     store = memory_store() if out is None else claim_store(out)
-    crew = hire(workers)
-    outcome = "stopped"
     try:
         _describe(store, task)
-        store.begin_run(describe_environment())
+        crew = hire(workers)
         most = task.keys.search.evaluations
-        with Progress(most, shown=show_progress) as progress:
+        with running(store, crew), Progress(most, shown=show_progress) as progress:
             found = answer(task, Explorer(study, plan, crew, store, progress), plan)
-        outcome = "finished"
     finally:
-        crew.close()
-        store.end_run(outcome)
         store.close()
     if out is not None:
         path = Path(out) / CARD

@@ -251,7 +251,7 @@ class Search:
                 f" or tie lengths with [[derived]]. The first of them: {self.failures[0][1]}"
             )
         for one in self.task.keys.objective:
-            column = self.values[:, self.task.columns.index(one.column)]
+            column = self.values[:, self.task.place(one.column)]
             if np.ptp(column) <= 1e-12 * np.abs(column).max():
                 why = "The card states nothing that makes one, such as a part of the loss or an imperfection." if column[0] == 0 else ""  # fmt: skip
                 raise InputError(

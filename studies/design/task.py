@@ -43,6 +43,10 @@ class Task:
         """The names of all columns."""
         return [column.name for column in self.study.columns]
 
+    def place(self, column: str) -> int:
+        """Return where a column stands."""
+        return self.columns.index(column)
+
     @property
     def wanted(self) -> list[str]:
         """The columns of objectives and constraints, each once."""

@@ -1,7 +1,7 @@
 """The CVG cross-damping paper's compensation on a virtual gyro: figures 1 and 2, and what sets the improvement of some 8 times."""
 
 from dataclasses import dataclass
-from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from compensation.cross_damping import (
 from compensation.decimation import average_blocks
 from compensation.improvement import AVERAGING, Change, compare_outputs
 from compensation.transfer import TransferFunction
+from studies.files.columns import read_columns
 from studies.fits.cross_damping import CrossDampingStudy, study_cross_damping
 from studies.reports import style
 from studies.results import Chapter, Drawing, Figure, Sentence, Table
@@ -37,9 +38,7 @@ PRINTED_IMPROVEMENT = 8.0
 
 def read_shape() -> Array:
     """Return the printed coefficients of eq. (10), constant first."""
-    text = (files("studies.papers") / "cvg_cross_damping.csv").read_text(encoding="utf-8")
-    rows = [line.split(",") for line in text.splitlines() if line and line[0].isdigit()]
-    return np.array([float(row[1]) for row in rows])
+    return read_columns(Path(__file__).with_suffix(".csv"), ("i", "zeta_i")).values["zeta_i"]
 
 
 def make_profile(soak_h: float = 1.0) -> tuple[Array, Array]:

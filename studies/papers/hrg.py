@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -78,13 +77,13 @@ def printed_table1() -> tuple[Array, Array]:
 
 def table1_path() -> Path:
     """Return the file of the paper's Table 1."""
-    return _data("hrg_table1.csv")
+    return Path(__file__).with_name("hrg_table1.csv")
 
 
 def printed_table2() -> tuple[Array, Array]:
     """Return the calculated temperatures and the errors (°C) that the paper's Table 2 prints."""
     names = ("frequency_Hz", "actual_temperature_C", "calculated_temperature_C", "error_C")
-    table = read_columns(_data("hrg_table2.csv"), names, required=names)
+    table = read_columns(Path(__file__).with_name("hrg_table2.csv"), names, required=names)
     return table.values["calculated_temperature_C"], table.values["error_C"]
 
 
@@ -127,7 +126,3 @@ def compare_physics(study: FrequencyStudy, instrument: Instrument) -> PhysicsCom
     measured, predicted = curvature(np.log(study.frequency)), curvature(law.logarithm(T))
     parts, uncertainty = law.parts(at), law.slope_uncertainty(at)
     return PhysicsComparison(instrument, at, parts, uncertainty, laws, measured, predicted, sd)
-
-
-def _data(name: str) -> Path:
-    return Path(str(files("studies"))) / "papers" / name

@@ -161,7 +161,7 @@ def _pictures(results: Results) -> list[Part]:
     if results.study.sampling.method == "one-at-a-time":
         return []  # the tornado says it better
     try:
-        limits = [resolve_limits(results, requirement) for requirement in results.study.requirements]
+        limits = [(one.column, resolve_limits(results, one)) for one in results.study.requirements]
     except InputError:
         limits = []
     parts: list[Part] = []
@@ -169,7 +169,8 @@ def _pictures(results: Results) -> list[Part]:
         n, count = results.numbers[column.name], int(np.isfinite(results.column(column.name)).sum())
         if count >= 20 and n["greatest"] > n["least"]:
             words, alt = f"Distribution of {column.label} over {count} designs.", f"Histogram of {column.label}."
-            parts.append(Figure(partial(figures.draw_spread, results, column, limits), words, alt))
+            ends = [end for name, pair in limits if name == column.name for end in pair]
+            parts.append(Figure(partial(figures.draw_spread, results, column, ends), words, alt))
         parts += figures.response_figures(results, column)
     return parts
 

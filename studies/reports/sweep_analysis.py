@@ -94,9 +94,9 @@ def tolerance_parts(results: Results) -> list[Part]:
     try:
         rows = []
         for requirement in study.requirements:
-            limits = resolve_limits(results, requirement)
-            ends = {"from": _end(limits.low), "to": _end(limits.high)}
-            rows.append({"requirement": limits.column} | ends | _yield_row(results, (requirement,)))
+            low, high = (end if np.isfinite(end) else None for end in resolve_limits(results, requirement))
+            limits = {"requirement": requirement.column, "from": low, "to": high}
+            rows.append(limits | _yield_row(results, (requirement,)))
         rows.append({"requirement": "all requirements"} | _yield_row(results, study.requirements))
     except InputError as error:
         return [Sentence(str(error), "warning")]
@@ -111,12 +111,8 @@ def _doubts(results: Results) -> Iterator[str]:
     for asked in results.study.requirements:
         (k, column), nominal = columns[asked.column], results.nominal
         if nominal is not None and not asked.is_relative:
-            value, error, limits = nominal.values[k], nominal.errors[k], resolve_limits(results, asked)[1:]
+            value, error, limits = nominal.values[k], nominal.errors[k], resolve_limits(results, asked)
             yield tell_doubt(column.label, column.unit, float(value), float(error), limits)
-
-
-def _end(value: float) -> float | None:
-    return value if np.isfinite(value) else None
 
 
 def _yield_row(results: Results, requirements: Any) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Figures of a study: how results are spread, how they follow the parameters, and which parameter matters."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from studies.sweeps.definition import StudyParameter
 from studies.sweeps.quantity import Column
 from studies.sweeps.results import Results
 from studies.sweeps.sensitivity import LocalSlope, SobolIndices
-from studies.sweeps.tolerance import RequirementLimits
 
 
 def label(name: str, unit: str) -> str:
@@ -58,7 +58,7 @@ def _is_map(results: Results) -> bool:
     return results.study.sampling.method == "grid" and len(_numeric(results)) == 2 == len(results.study.parameters)
 
 
-def draw_spread(results: Results, column: Column, limits: list[RequirementLimits]) -> Drawing:
+def draw_spread(results: Results, column: Column, limits: Sequence[float]) -> Drawing:
     """Draw the histogram of a column, with the nominal design and the limits asked for."""
     y, n = results.column(column.name), results.numbers[column.name]
     count = int(np.isfinite(y).sum())
@@ -66,11 +66,9 @@ def draw_spread(results: Results, column: Column, limits: list[RequirementLimits
     with style.figure(height=2.6, x=column_label(column), y="designs") as (made, axes):
         axes.hist(edges[:-1], list(edges), weights=bars, color=style.SKY, edgecolor="white", linewidth=0.4)
         if results.nominal is not None:
-            place = [c.name for c in results.study.columns].index(column.name)
-            axes.axvline(results.nominal.values[place], color=style.BLACK, linewidth=1.2, label="nominal design")
-        ends = {end for limit in limits if limit.column == column.name for end in (limit.low, limit.high)}
+            axes.axvline(n["nominal"], color=style.BLACK, linewidth=1.2, label="nominal design")
         near = n["greatest"] - n["least"]  # what lies farther away than the spread is said, so that the bars stay wide
-        for end in sorted(end for end in ends if np.isfinite(end)):
+        for end in sorted({end for end in limits if np.isfinite(end)}):
             if n["least"] - near <= end <= n["greatest"] + near:
                 axes.axvline(end, color=style.VERMILION, linestyle="--", label=f"required: {end:.8g}")
             else:

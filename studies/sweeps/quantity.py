@@ -77,18 +77,23 @@ class HarmonicQuantity(Quantity, frozen=True, kw_only=True):
     harmonic: Annotated[int, number("circumferential harmonic n", least=0, most=100)] = 2
     theory: Annotated[Literal["solid", "shell", "rayleigh"], says("solid (three-dimensional), shell (Naghdi) or rayleigh (closed form)")] = "solid"  # fmt: skip
 
+    @property
+    def place(self) -> int:
+        """Which of the harmonic's modes it is of, 0 for the lowest."""
+        return int(getattr(self, "index", 0))
+
     def list_modes(self) -> "Iterable[tuple[int, int, float]]":
         """Return what it solves at least: harmonic, number of modes, tolerance."""
-        return [(self.harmonic, 1, TOLERANCE)]
+        return [(self.harmonic, self.place + 1, TOLERANCE)]
 
     def stem(self, what: str) -> str:
-        """Return such as frequency_n2."""
-        return f"{what}_n{self.harmonic}"
+        """Return such as frequency_n2, or frequency_n2_1 for a higher mode."""
+        return f"{what}_n{self.harmonic}" + (f"_{self.place}" if self.place else "")
 
     @property
     def words(self) -> str:
-        """Such as "n = 2"."""
-        return f"n = {self.harmonic}"
+        """Such as "n = 2", or "n = 2, mode 1" for a higher mode."""
+        return f"n = {self.harmonic}" + (f", mode {self.place}" if self.place else "")
 
 
 Temperature = Annotated[
@@ -101,25 +106,12 @@ class ModeQuantity(HarmonicQuantity, frozen=True, kw_only=True):
 
     temperature_degC: Temperature | None = None
 
+    def mode(self, case: Case) -> "Mode":
+        """Return the mode of a design."""
+        return case.mode(self.harmonic, self.place, self.theory, case.temperature(self.temperature_degC))
+
 
 class OvertoneQuantity(ModeQuantity, frozen=True, kw_only=True):
     """A quantity of one of the modes of a harmonic."""
 
     index: Annotated[int, number("0 for the lowest mode of the harmonic", least=0, most=20)] = 0
-
-    def list_modes(self) -> "Iterable[tuple[int, int, float]]":
-        """Return what it solves at least."""
-        return [(self.harmonic, self.index + 1, TOLERANCE)]
-
-    def stem(self, what: str) -> str:
-        """Return such as frequency_n2, or frequency_n2_1 for a higher mode."""
-        return f"{what}_n{self.harmonic}" + (f"_{self.index}" if self.index else "")
-
-    @property
-    def words(self) -> str:
-        """Such as "n = 2", or "n = 2, mode 1" for a higher mode."""
-        return f"n = {self.harmonic}" + (f", mode {self.index}" if self.index else "")
-
-    def mode(self, case: Case) -> "Mode":
-        """Return the mode of a design."""
-        return case.mode(self.harmonic, self.index, self.theory, case.temperature(self.temperature_degC))

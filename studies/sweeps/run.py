@@ -4,7 +4,8 @@ import json
 import resource
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -72,8 +73,13 @@ def run_study(
             describe_study(store, study, identify(study, design, sources, _describe_families(families)), design)
             if families and scheduler is not None:
                 warnings.warn(f"{scheduler} is not used: the designs are interpolated in this process.", stacklevel=2)
-            crew = Here() if families else hire(workers, scheduler)
-            _run(store, study, design, WorkPlan.of(study, families), crew, show_progress)
+            crew, plan = Here() if families else hire(workers, scheduler), WorkPlan.of(study, families)
+            with running(store, crew):
+                batches = missing_batches(study, design, store, families is not None)
+                done = sum(store.counts().values())
+                with Progress(len(design), done, show_progress) as progress:
+                    compute(plan, batches, crew, store, progress)
+                run_searches(study, plan, crew, store)
     except BaseException:
         store.close()
         raise
@@ -200,15 +206,13 @@ def _describe_families(families: Families | None) -> Any:
     ]
 
 
-def _run(store: Store, study: Study, design: Array, plan: WorkPlan, crew: Workers, show_progress: bool) -> None:
+@contextmanager
+def running(store: Store, crew: Workers) -> Iterator[None]:
+    """Note in a store that a run begins, on what, and how it ends; its workers end with it."""
     outcome = "stopped"
     store.begin_run(describe_environment())
     try:
-        batches = missing_batches(study, design, store, plan.families is not None)
-        done = sum(store.counts().values())
-        with Progress(len(design), done, show_progress) as progress:
-            compute(plan, batches, crew, store, progress)
-        run_searches(study, plan, crew, store)
+        yield
         outcome = "finished"
     except KeyboardInterrupt:
         outcome = "interrupted"

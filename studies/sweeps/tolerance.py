@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -10,15 +9,6 @@ from compensation.arrays import Array
 from studies.errors import InputError
 from studies.sweeps.keys import DRAWN, Requirement
 from studies.sweeps.results import Results
-
-
-class RequirementLimits(NamedTuple):
-    """What a requirement asks of a column; an end that is open is infinite."""
-
-    column: str
-    low: float
-    high: float
-
 
 COUNTS = 1e-3  # of a value: an error below it is that of a solve that was asked for so
 
@@ -53,24 +43,23 @@ class Yield:
         return self.passed / max(self.cases - self.unknown, 1)
 
 
-def resolve_limits(results: Results, requirement: Requirement) -> RequirementLimits:
-    """Return the limits of a requirement; without a target they lie about the nominal design's value."""
-    place = [column.name for column in results.study.columns].index(requirement.column)
-    low, high = requirement.limits(float(results.nominal.values[place]) if results.nominal is not None else np.nan)
+def resolve_limits(results: Results, requirement: Requirement) -> tuple[float, float]:
+    """Return the limits of a requirement, infinite where open; without a target they lie about the nominal design's value."""
+    low, high = requirement.limits(results.numbers[requirement.column]["nominal"])
     if np.isnan(low):
         raise InputError(f"the nominal design has no {requirement.column}; give the requirement a target.")
-    return RequirementLimits(requirement.column, low, high)
+    return low, high
 
 
 def find_yield(results: Results, requirements: tuple[Requirement, ...]) -> Yield:
     """Return the share of sampled designs that meet all the requirements; unknown is where no known value fails, but one lacks."""
     from scipy.special import ndtri
 
-    columns, low, high = zip(*(resolve_limits(results, requirement) for requirement in requirements), strict=True)
+    low, high = np.transpose([resolve_limits(results, requirement) for requirement in requirements])
     # rows that are independent draws: of Saltelli's design the first two blocks
     last = 2 * results.study.sampling.cases if results.study.sampling.method == "sensitivity" else len(results)
     n = passed = unknown = 0
-    for found in results.pieces([], columns):
+    for found in results.pieces([], [requirement.column for requirement in requirements]):
         values = found[:, : last - n].T
         inside = (values >= low) & (values <= high)
         good, fails = inside.all(axis=1), (np.isfinite(values) & ~inside).any(axis=1)

@@ -38,7 +38,7 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
         from shell.modes import nearest_mode
 
         at = case.temperature(self.temperature_degC)
-        own = case.mode(self.harmonic, 0, self.theory, at)
+        own = self.mode(case)
 
         def solve(n: int, count: int) -> "tuple[Mode, ...]":
             return case.modes(n, count, self.theory, at, TOLERANCE if n == self.harmonic else self.tolerance)

@@ -24,6 +24,6 @@ class Split(ModeQuantity, frozen=True, kw_only=True, tag="split"):
         from studies.resonator.splitting import SplitPair
 
         T = case.temperature(self.temperature_degC)
-        whole = SplitPair(case.instrument, case.mode(self.harmonic, 0, self.theory, T), T)
+        whole = SplitPair(case.instrument, self.mode(case), T)
         split = whole.of_every_order() if self.order == "every" else whole.split
         return Number(split.hertz), Number(math.degrees(split.slow_axis))

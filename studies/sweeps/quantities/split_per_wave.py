@@ -29,6 +29,6 @@ class SplitPerWave(ModeQuantity, frozen=True, kw_only=True, tag="split-per-wave"
         T = case.temperature(self.temperature_degC)
         wave = {"of": self.of, "order": self.order, "amplitude_um": AMPLITUDE}
         alone = case.instrument.with_table("imperfection", {"wave": [wave]})
-        whole = SplitPair(alone, case.mode(self.harmonic, 0, self.theory, T), T)
+        whole = SplitPair(alone, self.mode(case), T)
         split = whole.imperfection if self.order == 2 * self.harmonic else whole.of_every_order()
         return (Number(split.hertz / AMPLITUDE),)

@@ -164,7 +164,7 @@ def test_recovery_dome_at_8_khz(tmp_path):
     assert after["inverse_q_n2_mount"] < before["inverse_q_n2_mount"] / 5
     assert found.verified == pytest.approx(found.after, rel=1e-9)
     kept = found.history[:, 0] == 0
-    mount = found.values[kept, found.place("inverse_q_n2_mount")]
+    mount = found.values[kept, found.task.place("inverse_q_n2_mount")]
     assert after["inverse_q_n2_mount"] <= 1.05 * mount.min()  # in whole steps of wall and stem
 
 
@@ -174,7 +174,7 @@ def test_recovery_light_cylinder(tmp_path):
     task = write(tmp_path, shipped_tasks()["light-cylinder"].read_text(encoding="utf-8") + FEW)
     found = optimise(task, workers=1)
     assert found.best == pytest.approx([0.83, 18.2, 0.6])
-    assert found.after[found.place("mass_g")] == pytest.approx(11.694, abs=1e-3)
+    assert found.after[found.task.place("mass_g")] == pytest.approx(11.694, abs=1e-3)
     assert all(limit.room >= 0 for limit in found.limits)
 
 
@@ -191,7 +191,7 @@ def test_recovery_robust_dome(tmp_path, monkeypatch):
     assert found.verified == pytest.approx(found.after, rel=1e-9)
     assert all(limit.room - limit.margin > -2e-6 * abs(limit.limit) for limit in found.limits)
     assert any(limit.price for limit in found.limits)
-    column = found.place(found.task.keys.objective[0].column)
+    column = found.task.place(found.task.keys.objective[0].column)
     kept = found.history[:, 0] == 0
     assert found.after[column] <= found.values[kept, column].min() * (1 + 1e-4)
     (frequency,) = [one for one in found.spreads if one.column == "frequency_n2_Hz"]
@@ -209,5 +209,5 @@ def test_planted_the_closed_form_can_be_wanted(tmp_path, capsys):
     assert found.best[1] == pytest.approx(12)
     assert found.after == pytest.approx(found.verified, rel=1e-12)
     assert main(["optimise", task, "--out", out, "--workers", "1"]) == 0
-    error = found.errors[found.place("frequency_n2_Hz")]  # against shell theory
+    error = found.errors[found.task.place("frequency_n2_Hz")]  # against shell theory
     assert f"known to ± {error:.4g} Hz by its theory and solve" in " ".join(capsys.readouterr().out.split())
