@@ -43,22 +43,12 @@ def fit_rough(run: BellRun) -> tuple[float, float, Array]:
     return float(null), float(1 / slope), to_scale @ covariance @ to_scale.T
 
 
-def fit_bias(temperature: ArrayLike, rough: ArrayLike) -> PolynomialCurve:
-    """Fit N(T) to the rough output (°/s) of a gyro at rest, over temperature (°C): eq. (34)."""
-    return _fit_curve(temperature, rough, "temperature")
-
-
-def fit_scale_over_rate(bias_compensated: ArrayLike, rate: ArrayLike) -> PolynomialCurve:
-    """Fit the applied rate over the measured one (both °/s), at one temperature: eq. (35); its noise flattens the line by some 1e-7."""
-    return _fit_curve(bias_compensated, rate, "measured rate")
-
-
 def fit_scale_over_temperature(temperature: ArrayLike, rate_compensated: ArrayLike, rate: ArrayLike) -> PolynomialCurve:
     """Fit the factor that brings the output to the applied rate (°/s), over temperature (°C): eq. (36)."""
     T, measured, applied = read_columns(temperature=temperature, rate_compensated=rate_compensated, rate=rate)
     if np.any(applied == 0) or np.any(np.abs(measured) < 0.1 * np.abs(applied)):
         raise CompensationError("the scale over temperature needs an applied rate in every row of the run.")
-    return _fit_curve(T, applied / measured, "temperature")
+    return fit_curve(T, applied / measured, "temperature")
 
 
 def fit_chain(
@@ -74,10 +64,13 @@ def fit_chain(
     null, scale, covariance = _step("rough null and scale (33)", fit_rough, rates if rough is None else rough)
     bias = _nothing(rates, 0.0)
     if rest is not None:
-        bias = _step("bias over temperature (34)", fit_bias, rest.temperature, scale * (rest.output - null))
+        bias = _step(
+            "bias over temperature (34)", fit_curve, rest.temperature, scale * (rest.output - null), "temperature"
+        )
     straight = scale * (rates.output - null) - bias.value(rates.temperature)
     averaged = 1.0 if sampling is None else max(float(np.median(np.diff(rates.time))) / sampling, 1.0)
-    fit = fit_scale_over_rate if form is None else partial(fit_rate_curve, form, averaged)
+    # noise of the measured rate flattens (35)'s line by some 1e-7
+    fit = partial(fit_curve, name="measured rate") if form is None else partial(fit_rate_curve, form, averaged)
     over_rate = _step("scale over rate (35)", fit, straight, rates.rate)
     over_temperature = _nothing(rates, 1.0)
     if turning is not None:
@@ -99,7 +92,8 @@ def _nothing(run: BellRun, value: float) -> PolynomialCurve:
     return PolynomialCurve(np.array([value, 0.0, 0.0]), np.zeros((3, 3)), *ends)
 
 
-def _fit_curve(x: ArrayLike, y: ArrayLike, name: str) -> PolynomialCurve:
+def fit_curve(x: ArrayLike, y: ArrayLike, name: str) -> PolynomialCurve:
+    """Fit a parabola with errors that wander, as of eqs. (34)–(36); `name` is that of x in messages."""
     fit = fit_polynomial(x, y, 2, name)
     coefficients, covariance = fit.about(0.0, correlated_covariance(fit.regression))
     return PolynomialCurve(coefficients, covariance, float(np.min(x)), float(np.max(x)))

@@ -25,7 +25,6 @@ from compensation.controllers import Loops
 from compensation.electronics import Electronics
 from compensation.errors import CompensationError
 
-CHANNELS = ("amplitude", "phase", "rate", "quadrature")
 FOUR = 4
 
 
@@ -82,8 +81,8 @@ class ClosedLoop:
             active[2] = 0.0
             A[2, :] = A[:, 2] = 0.0
         drive = self.drive_map
-        K = np.array([self.loops.gains(name)[0] for name in CHANNELS]) * active
-        K_i = np.array([self.loops.gains(name)[1] for name in CHANNELS]) * active
+        K = np.array([self.loops.gains(name)[0] for name in Loops.NAMES]) * active
+        K_i = np.array([self.loops.gains(name)[1] for name in Loops.NAMES]) * active
         smoothing = self.loops.smoothing
         seen = C_p @ part("wave") + part("offset")
         filtered = part("filtered") + smoothing * (seen - part("filtered"))
@@ -192,7 +191,7 @@ class ClosedLoop:
     def walk(self, channel: str) -> float:
         """Return the random walk (1/√s) of a command's integral: white noise of density S(0), which means over long times show."""
         F, noise = self.sample
-        kept, place = self.kept, self.places["sum"].start + CHANNELS.index(channel)
+        kept, place = self.kept, self.places["sum"].start + Loops.NAMES.index(channel)
         answer = np.zeros(self.size)  # of the command's sum to what enters the state once
         answer[place] = 1.0
         answer[kept] = np.linalg.solve((np.eye(len(kept)) - F[np.ix_(kept, kept)]).T, F[place, kept])
@@ -200,7 +199,7 @@ class ClosedLoop:
 
     def answer_step(self, channel: str, samples: int, count: int) -> tuple[Array, Array]:
         """Return times (s) and what a channel commands against a forcing of 1 that sets in at 0, every `samples` samples."""
-        at, k = self.places, CHANNELS.index(channel)
+        at, k = self.places, Loops.NAMES.index(channel)
         state, F = np.zeros(self.size), self.row(samples).map
         state[at["forcing"].start + k] = 1.0
         found = np.zeros(count + 1)

@@ -134,11 +134,6 @@ def settle_rebalance(
     )
 
 
-def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike) -> Array:
-    """Rate error (rad/s) by which the quadrature force leaks into the rate channel, ε q/(n k), times n k; the loop indicates its negative."""
-    return np.asarray(np.asarray(quadrature) * np.asarray(phase))
-
-
 def samples_in_row(time: Array, loops: Loops) -> int:
     """Return how many samples of the loops make one row, or say that they do not."""
     step = require_regular(time, "the simulation of the loops")

@@ -3,7 +3,7 @@
 import cmath
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -43,9 +43,7 @@ def start_up(tau: float, loops: Loops, *, headroom: float = 20.0, offset: float 
     least = tau * math.log(headroom / (headroom - 1))
     seconds = 3 * least + 20 / loops.phase + 10 / loops.amplitude
     T = max(loops.step, seconds / MOST_STEPS)
-    slow = Loops(
-        loops.amplitude, loops.phase, loops.rate, loops.quadrature, 1 / T, loops.delay, min(loops.demodulator, 1 / T)
-    )
+    slow = replace(loops, sampling=1 / T, demodulator=min(loops.demodulator, 1 / T))
     require_stable(slow, 1 / tau, ("amplitude", "phase"))
     (K_a, I_a), (K_p, I_p) = slow.gains("amplitude"), slow.gains("phase")
     most, smoothing, (late, rest) = headroom / tau, slow.smoothing, slow.late

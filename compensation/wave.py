@@ -99,21 +99,6 @@ class StandingWave:
         return replace(self, **numbers)
 
 
-def see_across(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Array:
-    """Sin 2n(θ − θ_axis): the effect of a split on the rate or quadrature of a wave at the azimuth θ (rad)."""
-    return np.asarray(np.sin(2 * harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
-
-
-def see_along(angle: ArrayLike, axis: ArrayLike) -> Array:
-    """Cos 2n(θ − θ_axis), n = 2: its effect on the decay or frequency of the wave."""
-    return np.asarray(np.cos(4 * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
-
-
-def feign_rate(across: ArrayLike, harmonic: int, bryan_factor: float) -> Array:
-    """Rate (rad/s) error due to a damping split Δ(1/τ) sin 2n(θ − θ_τ) (1/s): 1/(2 n k) of it."""
-    return np.asarray(across) / (2 * harmonic * bryan_factor)
-
-
 def turn(angle: float) -> Array:
     """Return the rotation R(ψ) of the plane."""
     cosine, sine = np.cos(angle), np.sin(angle)

@@ -92,8 +92,7 @@ def simulate_whole_angle(
         commands[n] = total / samples
     use = electronics.actuators.use(course.command, commands[:, 3], commands[:, 0])
     worst = int(np.argmax(np.max([use.across, use.quadrature, use.drive], axis=0)))
-    if use.worst > 1:
-        require_range(electronics.actuators.use(course.command[worst], *commands[worst, [3, 0]]), f"at {t[worst]:g} s")
+    require_range(electronics.actuators.use(course.command[worst], *commands[worst, [3, 0]]), f"at {t[worst]:g} s")
     after = course.measured(psi)
     theta = measured / rows.harmonic
     turned = np.diff(np.append(theta, after / rows.harmonic)) / h

@@ -125,7 +125,7 @@ class Clock:
 
         file, name = self.file, " ".join(self.file.time)
         text = table.joined(file.time)
-        empty = table.is_empty(text)
+        empty = np.asarray(text == "")
         plain = text.str.replace(",", ".", regex=False) if file.decimal == "," else text
         form = "ISO8601" if self.form == "iso" else self.form
         plain = plain.mask(empty)

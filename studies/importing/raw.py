@@ -24,7 +24,6 @@ from studies.importing.tables import ParsedTable, Part, RawTable, check_column
 
 if TYPE_CHECKING:
     import pandas as pd
-    from numpy.typing import NDArray
 
 OVERFLOW = "(beyond the header)"
 
@@ -48,23 +47,20 @@ class TextTable(RawTable):
         for part in parts[1:]:
             text = text + " " + part
         marked = np.any([part.isin(self.missing) for part in parts], axis=0)
-        return text.str.strip().mask(marked, "")
+        text = text.str.strip()
+        return text.mask(marked | text.isin(self.missing), "")
 
     def text(self, column: str) -> "pd.Series[str]":
         """Return the cells of one column without the blanks around them."""
         check_column(self.path, column, [str(name) for name in self.cells if name != OVERFLOW])
         return self.cells[column].str.strip()
 
-    def is_empty(self, text: "pd.Series[str]") -> "NDArray[np.bool_]":
-        """Tell which cells hold no value."""
-        return np.asarray(text.isin(["", *self.missing]))
-
     def read(self, column: str) -> Array:
         """Return a column as numbers, NaN where a cell is empty; anything else is an error that names the line."""
         import pandas as pd
 
         text = self.text(column)
-        empty = self.is_empty(text)
+        empty = np.asarray(text.isin(["", *self.missing]))
         plain = text.str.replace(self.thousands, "", regex=False) if self.thousands else text
         plain = plain.str.replace(self.decimal, ".", regex=False) if self.decimal != "." else plain
         values = pd.to_numeric(plain.mask(empty, "nan"), errors="coerce").to_numpy(dtype=float, copy=True)

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     import datetime
 
     import pandas as pd
-    from numpy.typing import NDArray
 
 
 OVERLOAD = 1e36
@@ -75,10 +74,6 @@ class RawTable:
         raise InputError(
             f"{self.path}: '{' '.join(columns)}' are numbers; time_format is a unit such as 's', or 'own'."
         )
-
-    def is_empty(self, text: "pd.Series[str]") -> "NDArray[np.bool_]":
-        """Tell which cells of text hold no value."""
-        raise NotImplementedError
 
     def own_clock(self) -> "tuple[Array, datetime.datetime | None]":
         """Return the seconds of every row by the file's own clock, and when it started."""

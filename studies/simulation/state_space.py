@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compensation.arrays import Array
-from compensation.closed_loop import CHANNELS, ClosedLoop, real_form
+from compensation.closed_loop import ClosedLoop, real_form
 from compensation.controllers import Loops, held
 from studies.errors import InputError
 from studies.files.writing import write_text, written_whole
@@ -122,4 +122,4 @@ def _cells(value: Any) -> Any:
 
 
 def _commands() -> tuple[str, ...]:
-    return tuple(f"command_{name}_per_s" for name in CHANNELS)
+    return tuple(f"command_{name}_per_s" for name in Loops.NAMES)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from compensation.closed_loop import CHANNELS
 from compensation.controllers import Loops
 from compensation.electronics import Electronics
 from compensation.errors import CompensationError
@@ -90,7 +89,7 @@ def simulate_carrier(
         turn(wave.harmonic * angle),
         *(c.matrix(wave.harmonic) for c in (electronics.pickoff, electronics.drive)),
     )
-    K, K_i = np.array([loops.gains(name) for name in CHANNELS]).T
+    K, K_i = np.array([loops.gains(name) for name in loops.NAMES]).T
     noise, limits = electronics.noise, electronics.actuators
     start = omega + float(wave.detuning(angle))
     y = np.concatenate([R[:, 0], np.zeros(2)])

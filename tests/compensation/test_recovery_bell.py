@@ -6,10 +6,9 @@ import pytest
 from compensation.bell import BellChain, PolynomialCurve, apply_chain, design_smoother, invert_chain, smooth
 from compensation.bell_calibration import (
     BellRun,
-    fit_bias,
     fit_chain,
+    fit_curve,
     fit_rough,
-    fit_scale_over_rate,
     fit_scale_over_temperature,
 )
 from compensation.errors import CompensationError
@@ -108,11 +107,11 @@ def test_intervals_allow_for_a_bias_that_wanders():
     runs, held, naive = 40, np.zeros(3), np.zeros(3)
     _, rest, _ = make_runs(np.random.default_rng(0), 0.0, 600, 30)
     rough = PRINTED.scale * (rest.output - PRINTED.null)
-    truth = fit_bias(rest.temperature, rough).coefficients
+    truth = fit_curve(rest.temperature, rough, "temperature").coefficients
     for seed in range(runs):
         generator = np.random.default_rng(seed)
         noise = 0.06 * generator.standard_normal(600) + 0.003 * np.cumsum(generator.standard_normal(600))
-        curve = fit_bias(rest.temperature, rough + noise)
+        curve = fit_curve(rest.temperature, rough + noise, "temperature")
         white = fit_polynomial(rest.temperature, rough + noise, 2).about(0.0)[1]
         off = np.abs(curve.coefficients - truth)
         held += off < 1.96 * np.sqrt(np.diag(curve.covariance))
@@ -124,9 +123,9 @@ def test_intervals_allow_for_a_bias_that_wanders():
 def _fit_clean(chain, clean):
     """What each step would be on noise-free records after the same earlier steps."""
     rates, rest, turning = clean
-    bias = fit_bias(rest.temperature, chain.scale * (rest.output - chain.null))
+    bias = fit_curve(rest.temperature, chain.scale * (rest.output - chain.null), "temperature")
     straight = chain.scale * (rates.output - chain.null) - chain.bias.value(rates.temperature)
-    over_rate = fit_scale_over_rate(straight, rates.rate)
+    over_rate = fit_curve(straight, rates.rate, "measured rate")
     rough = chain.scale * (turning.output - chain.null) - chain.bias.value(turning.temperature)
     constant = chain.scale_over_rate.value(rough)
     over_temperature = fit_scale_over_temperature(turning.temperature, constant, turning.rate)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from compensation.arrays import Array
-from compensation.wave import see_across, see_along
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import States
 
@@ -11,8 +10,8 @@ from studies.effects.states import States
 def columns(states: States, shape: Shape, response: str) -> Array:
     """B = D sin 4(θ − ψ(T)) with ψ = ψ₀ + ψ₁ x, x = T_r − T₀ in units of 10 K: what a wave meets of a split, across and along."""
     assert states.pattern_angle is not None
-    axis = np.radians(shape[0]) * states.excess / 10.0
-    return np.stack([see_across(states.pattern_angle, axis), see_along(states.pattern_angle, axis)], axis=1)
+    across = 4 * (states.pattern_angle - np.radians(shape[0]) * states.excess / 10.0)
+    return np.stack([np.sin(across), np.cos(across)], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:

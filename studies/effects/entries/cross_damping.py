@@ -3,7 +3,6 @@
 import numpy as np
 
 from compensation.arrays import Array
-from compensation.wave import see_across
 from shell.constants import zero_Celsius
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import ORDERS, States, lag, smoothness, waves
@@ -19,7 +18,7 @@ def columns(states: States, shape: Shape, response: str) -> Array:
     elif states.pattern_angle is None:
         return np.zeros_like(curve)
     else:
-        curve = curve * see_across(states.pattern_angle, np.radians(axis))[:, None]
+        curve = np.asarray(curve * np.sin(4 * (states.pattern_angle - np.radians(axis)))[:, None])
     if not pole:
         return curve
     return lag(curve, states.step, pole)  # eq. (9) is a lag 1/(kζ)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from compensation.arrays import Array
-from compensation.rebalance import leak_quadrature
 from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import States
 
@@ -11,7 +10,7 @@ from studies.effects.states import States
 def columns(states: States, shape: Shape, response: str) -> Array:
     """B = V_q (φ₀ + φ₁ x), x = T_r − T₀ in units of 10 K."""
     assert states.quadrature is not None
-    return np.stack([leak_quadrature(states.quadrature, phase) for phase in (1.0, states.excess / 10.0)], axis=1)
+    return np.stack([states.quadrature, states.quadrature * (states.excess / 10.0)], axis=1)
 
 
 EFFECT = Effect(

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
-from compensation.wave import feign_rate, see_across
 from studies.instrument.registry import CardTable
 from studies.schema.keys import Keys, Note, number
 
@@ -64,7 +63,7 @@ class Bias(Keys, frozen=True, kw_only=True):
             axis = np.exp(2j * harmonic * np.radians(self.damping_axis_deg))
             wave = np.asarray(self.damping_anisotropy * inverse_q * axis)
         split, axis = np.pi * frequency * np.abs(wave), np.angle(wave) / (2 * harmonic)  # Δ(1/τ) and θ_τ
-        drift = feign_rate(split * see_across(theta, axis, harmonic), harmonic, bryan_factor)
+        drift = split * np.sin(2 * harmonic * (theta - axis)) / (2 * harmonic * bryan_factor)
         return np.asarray(self.polynomial(change, rate) + DEG_PER_H * drift)
 
     def polynomial(self, change: Array, rate: Array) -> Array:

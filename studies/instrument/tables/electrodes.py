@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 
-from studies.instrument.registry import CardPlace, CardTable
+from studies.instrument.registry import CardTable
 from studies.schema.keys import Keys, Note, number, says
 
 if TYPE_CHECKING:
@@ -77,9 +77,9 @@ class CardElectrodes:
         return Electrodes(pair, patches, gap, sum(waves, Field()), k.face)
 
 
-def build(keys: ElectrodeKeys, place: CardPlace) -> CardElectrodes:
-    """Return the electrodes."""
-    return CardElectrodes(keys, place.reference_temperature)
-
-
-TABLE = CardTable("electrodes", ElectrodeKeys, build=build, optional=True)
+TABLE = CardTable(
+    "electrodes",
+    ElectrodeKeys,
+    build=lambda keys, place: CardElectrodes(keys, place.reference_temperature),
+    optional=True,
+)

@@ -13,7 +13,7 @@ It stands in place of `[resonator]`, `[material]` and `[thermal]`.
 """
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -84,6 +84,8 @@ class PolynomialLaw:
     lowest: float = 0.0
     highest: float = np.inf
     bryan_factor: float = 0.2774  # of a thin hemisphere
+    solver_error: ClassVar[float] = 0.0  # relative: nothing is solved
+    interpolation_error: ClassVar[float] = 0.0  # relative, between knots: there are none
 
     def frequency(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Frequency (Hz) at temperatures (K)."""
@@ -132,16 +134,6 @@ class PolynomialLaw:
     def uncertainty(self, temperature: ArrayLike) -> Array:
         """Standard deviation of ln f by a material's prior: it has none."""
         return np.zeros_like(np.asarray(temperature, dtype=float))
-
-    @property
-    def solver_error(self) -> float:
-        """Relative error of a solver: nothing is solved."""
-        return 0.0
-
-    @property
-    def interpolation_error(self) -> float:
-        """Relative error between knots: there are none."""
-        return 0.0
 
     def between(self, lowest: float, highest: float) -> "PolynomialLaw":
         """Return the law between two temperatures (K)."""
