@@ -45,7 +45,7 @@ class WholeSteps:
             found = [float(n * self.sizes[k]) for n in near if inside[0] <= n * self.sizes[k] <= inside[1]]
             choices.append(found or [value])
         count = int(np.prod([len(one) for one in choices]))
-        grid = range(count) if count <= MOST_CORNERS else rng.choice(count, MOST_CORNERS, replace=False)
-        shape = tuple(len(one) for one in choices)
-        rows = [[one[i] for one, i in zip(choices, np.unravel_index(int(k), shape), strict=True)] for k in grid]
-        return [(np.array(row) - self.low) / self.width for row in rows]
+        grid = np.arange(count) if count <= MOST_CORNERS else rng.choice(count, MOST_CORNERS, replace=False)
+        places = np.unravel_index(grid, [len(one) for one in choices])
+        rows = np.column_stack([np.array(one)[k] for one, k in zip(choices, places, strict=True)])
+        return list((rows - self.low) / self.width)

@@ -19,6 +19,7 @@ from studies.resonator.law import law_of
 
 RESOLUTION = 0.01  # Hz, last printed digit of Table 1
 CARD = "hrg-30mm"
+TABLE1 = Path(__file__).with_name("hrg_table1.csv")
 
 
 @dataclass(frozen=True)
@@ -71,13 +72,8 @@ class PhysicsComparison:
 
 def printed_table1() -> tuple[Array, Array]:
     """Return temperatures (°C) and frequencies (Hz) of the paper's Table 1."""
-    table = read_frequency_table(table1_path())
+    table = read_frequency_table(TABLE1)
     return table.values["temperature_degC"], table.values["frequency_Hz"]
-
-
-def table1_path() -> Path:
-    """Return the file of the paper's Table 1."""
-    return Path(__file__).with_name("hrg_table1.csv")
 
 
 def printed_table2() -> tuple[Array, Array]:

@@ -74,7 +74,7 @@ def reproduce_papers() -> tuple[FrequencyStudy, Result]:
     instrument = load_card(hrg.CARD)
     study = hrg.study_table(*hrg.printed_table1(), resolution=hrg.RESOLUTION)
     physics = hrg.compare_physics(study, instrument)
-    diagnosis = diagnose_table(str(hrg.table1_path()))
+    diagnosis = diagnose_table(str(hrg.TABLE1))
     told("settling after a temperature step (figure 3)", 0.1)
     settling = study_settling(instrument)
     told(f"{GYROS} virtual gyros: bias compensation (figure 6)", 0.2)

@@ -84,11 +84,6 @@ class Results(Shown):
         """Return why a case failed, or what the solver warned of; mostly nothing."""
         return self._remarks.get(place, ("", ""))[1]
 
-    @property
-    def remarks(self) -> list[str]:
-        """The remark of every case."""
-        return [self.remark(place) for place in range(len(self))]
-
     @cached_property
     def failed(self) -> NDArray[np.intp]:
         """The places of the cases that failed."""

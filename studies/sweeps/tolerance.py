@@ -53,7 +53,7 @@ def resolve_limits(results: Results, requirement: Requirement) -> tuple[float, f
 
 def find_yield(results: Results, requirements: tuple[Requirement, ...]) -> Yield:
     """Return the share of sampled designs that meet all the requirements; unknown is where no known value fails, but one lacks."""
-    from scipy.special import ndtri
+    from scipy.stats import binomtest
 
     low, high = np.transpose([resolve_limits(results, requirement) for requirement in requirements])
     # rows that are independent draws: of Saltelli's design the first two blocks
@@ -66,10 +66,8 @@ def find_yield(results: Results, requirements: tuple[Requirement, ...]) -> Yield
         n, passed, unknown = n + len(values), passed + int(good.sum()), unknown + int((~good & ~fails).sum())
     if results.study.sampling.method not in DRAWN or n == 0:
         return Yield(n, passed, unknown)
-    ends = []
-    for count, z in ((passed, -ndtri(0.95)), (passed + unknown, ndtri(0.95))):  # Wilson's interval
-        ends.append((count + z**2 / 2 + z * np.sqrt(count * (n - count) / n + z**2 / 4)) / (n + z**2))
-    return Yield(n, passed, unknown, float(ends[0]), float(ends[1]))
+    worst, best = (binomtest(count, n).proportion_ci(0.9, "wilson") for count in (passed, passed + unknown))
+    return Yield(n, passed, unknown, float(worst.low), float(best.high))
 
 
 def place_limits(values: Array, nominal: float, low: float, high: float) -> Array:

@@ -206,9 +206,7 @@ def test_the_papers_slope_is_shown_to_the_digits_of_the_cards_uncertainty():
     from studies.papers import hrg
     from studies.reports.diagnosis_table import law_facts
 
-    (slope,) = [
-        one for one in law_facts(diagnose_table(str(hrg.table1_path()), "hrg-30mm")) if one[0].startswith("Slope")
-    ]
+    (slope,) = [one for one in law_facts(diagnose_table(str(hrg.TABLE1), "hrg-30mm")) if one[0].startswith("Slope")]
     assert slope[1] == "79.2 ppm/°C"
     assert "88.7 ± 6.3" in slope[2]
 

@@ -186,7 +186,7 @@ def test_a_function_that_was_killed_is_tried_again_and_its_case_is_lost_and_not_
     spec = written(tmp_path, "unlucky", 'method = "grid"', 'name = "user.x"\nvalues = [0, 1, 2]')
     with contextlib.closing(run_study(spec, tmp_path / "out", workers=1, allow_python=True)) as results:
         assert results.store.counts() == {"ok": 2, "lost": 1}
-        assert "SIGTERM" in results.remarks[2]
+        assert "SIGTERM" in results.remark(2)
         assert results.values[1, 0] == 1.0
 
 
