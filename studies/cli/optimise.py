@@ -62,7 +62,9 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
 
 def _parameters(found: Answer) -> list[dict[str, Any]]:
     rows = []
-    for p, start, best in zip(found.task.study.parameters[: found.task.free], found.start, found.best, strict=False):
+    for p, start, best in zip(
+        found.task.study.parameters[: found.task.free], found.task.start, found.best, strict=False
+    ):
         near = 1e-3 * (p.high - p.low)
         at = "low" if best - p.low < near else "high" if p.high - best < near else None
         rows.append(row_of(p, "name", "low", "high") | {"start": float(start), "best": float(best), "at_bound": at})

@@ -53,9 +53,8 @@ class Answer:
     """What a task was answered."""
 
     task: Task
-    # start, best: (parameters,) values; before, after : their columns; foretold : the interpolant's numbers for the
-    # best one.
-    start: Array
+    # best: (parameters,) values; before, after: columns of the start and of the best design; foretold: the
+    # interpolant's numbers for the best one.
     before: Array
     best: Array
     after: Array
@@ -107,7 +106,6 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
     merits = [search.merit(k, scalar) for k in range(len(search.values))]
     return Answer(
         task,
-        task.start,
         search.values[0],
         design,
         values,

@@ -53,21 +53,12 @@ class PhysicsComparison:
     instrument: Instrument
     temperature: Array
     parts: SlopeParts  # 1/K, of the slope by the card's law, at the local temperatures and, last, at 20 °C
-    uncertainty: Array  # 1/K, of the slope
+    slope_ppm: Array  # ppm/°C, their sum
+    uncertainty_ppm: Array  # ppm/°C, its standard deviation by the law's prior
     laws: Sequence[tuple[str, float, float]]  # name, slope at 20 °C and its uncertainty (ppm/°C) of every published law
     curvature_measured: float  # ppm/°C², twice the quadratic coefficient of ln f
     curvature_law: float
     curvature_uncertainty: float
-
-    @property
-    def slope_ppm(self) -> Array:
-        """Slopes of ln f, ppm/°C."""
-        return np.asarray(1e6 * self.parts.total)
-
-    @property
-    def uncertainty_ppm(self) -> Array:
-        """Their standard deviations by the law's prior, ppm/°C."""
-        return 1e6 * self.uncertainty
 
 
 def printed_table1() -> tuple[Array, Array]:
@@ -120,5 +111,6 @@ def compare_physics(study: FrequencyStudy, instrument: Instrument) -> PhysicsCom
     curvatures = np.array([curvature(moved[prior.names[k]]) for k in acting])
     sd = float(np.sqrt(curvatures @ prior.covariance[np.ix_(acting, acting)] @ curvatures))
     measured, predicted = curvature(np.log(study.frequency)), curvature(law.logarithm(T))
-    parts, uncertainty = law.parts(at), law.slope_uncertainty(at)
-    return PhysicsComparison(instrument, at, parts, uncertainty, laws, measured, predicted, sd)
+    parts, slope_sd = law.parts(at), 1e6 * law.slope_uncertainty(at)
+    slope = np.asarray(1e6 * parts.total)
+    return PhysicsComparison(instrument, at, parts, slope, slope_sd, laws, measured, predicted, sd)
