@@ -16,6 +16,7 @@ from studies.reports import sweep_figures as figures
 from studies.results import Blocks, Chapter, Column, Facts, Figure, Part, Result, Sentence, Table
 from studies.sweeps.definition import StudyParameter
 from studies.sweeps.design import nominal_design
+from studies.sweeps.keys import DRAWN
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 from studies.sweeps.results import Results
 from studies.sweeps.tolerance import resolve_limits
@@ -100,7 +101,7 @@ def _asked(results: Results) -> list[Part]:
         Column(lambda one: ", ".join(f"{k} = {v}" for k, v in one.options.items() if v is not None), "Options"),
     )
     words = f"Sampling: {METHODS[sampling.method]}"
-    words += f", seed {sampling.seed}" if sampling.method in ("latin-hypercube", "sobol", "sensitivity") else ""
+    words += f", seed {sampling.seed}" if sampling.method in DRAWN else ""
     full = results.about["identity"]["solver"] == "full"
     family = "interpolated between full solves, with a stated interpolation error"
     solver = "every design solved in full" if full else family
@@ -198,11 +199,11 @@ def _shapes(results: Results) -> list[Part]:
     n, theory, column = modal[0].options["harmonic"], modal[0].options["theory"], modal[0].columns[0]
     designs = {"Nominal design": nominal_design(study)}
     y = results.column(column.name)
-    if np.isfinite(y).any() and any(name.startswith("resonator.") for name in study.names):
+    names = [name for name in study.names if name.startswith("resonator.")]
+    if names and np.isfinite(y).any():
         designs[f"Minimum {column.label}"] = results.design(int(np.nanargmin(y)))
         designs[f"Maximum {column.label}"] = results.design(int(np.nanargmax(y)))
     units = {parameter.name: parameter.unit for parameter in study.parameters}
-    names = [name for name in study.names if name.startswith("resonator.")]
     parts: list[Part] = []
     for title, design in designs.items():
         words = ", ".join(

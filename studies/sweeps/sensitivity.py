@@ -75,14 +75,11 @@ def sobol_indices(results: Results, column: str) -> SobolIndices:
 
 
 def _indices(A: Array, B: Array, AB: Array) -> tuple[Array, Array]:
-    """S_i = ⟨f_B (f_ABi − f_A)⟩ / V and T_i = ½ ⟨(f_A − f_ABi)²⟩ / V, about the mean, as `scipy.stats.sobol_indices`."""
-    both = np.concatenate([A, B])
-    mean, variance = both.mean(), both.var()
-    if variance == 0:
-        return np.zeros(len(AB)), np.zeros(len(AB))
-    first = ((B - mean) * (AB - A)).mean(axis=1) / variance
-    total = 0.5 * ((A - AB) ** 2).mean(axis=1) / variance
-    return first, total
+    """S_i = ⟨f_B (f_ABi − f_A)⟩ / V and T_i = ½ ⟨(f_A − f_ABi)²⟩ / V, about the mean; 0 where V is."""
+    from scipy import stats
+
+    found = stats.sobol_indices(func={"f_A": A[None], "f_B": B[None], "f_AB": AB[:, None]}, n=len(A))
+    return np.ravel(found.first_order), np.ravel(found.total_order)
 
 
 def local_slopes(results: Results, column: str) -> list[LocalSlope]:

@@ -55,17 +55,6 @@ def test_sobol_indices_of_ishigami(ishigami):
 
 
 @pytest.mark.slow
-def test_sobol_indices_equal_scipy(ishigami):
-    from scipy.stats import sobol_indices as oracle
-
-    y, n = ishigami.column("ishigami"), 1024
-    given = {"f_A": y[None, :n], "f_B": y[None, n : 2 * n], "f_AB": y[2 * n :].reshape(4, 1, n)}
-    expected, found = oracle(func=given, n=n), sobol_indices(ishigami, "ishigami")
-    assert found.first == pytest.approx(expected.first_order, abs=1e-12)
-    assert found.total == pytest.approx(expected.total_order, abs=1e-12)
-
-
-@pytest.mark.slow
 def test_no_influence_is_exactly_none(ishigami):
     found = sobol_indices(ishigami, "ishigami")
     assert (found.first[3], found.total[3], found.total_low[3], found.total_high[3]) == (0, 0, 0, 0)
