@@ -59,6 +59,17 @@ def tune(k: float, zeta: float, *, q10: float = 1.0) -> SensitiveElement:
     return SensitiveElement(k, k, zeta, zeta, omega=k * math.sqrt(1 - 2 * zeta**2), q10=q10)
 
 
+def translate(
+    frame: float, proof_mass: float, k: tuple[float, float], zeta: tuple[float, float], omega: float, *,
+    q10: float = 1.0,
+) -> SensitiveElement:  # fmt: skip
+    """Return a proof mass in a decoupling frame, eq. (1): d₁ = d₂ = 1, d₃ = m₂/(m₁ + m₂), g₁ = 2 m₂/(m₁ + m₂), g₂ = 2."""
+    if not (frame >= 0 and proof_mass > 0):
+        raise CompensationError(f"the proof mass must be positive, the frame 0 or more: {proof_mass:g}, {frame:g} kg.")
+    share = proof_mass / (frame + proof_mass)
+    return SensitiveElement(k[0], k[1], zeta[0], zeta[1], omega, q10, d1=1.0, d2=1.0, d3=share, g1=2 * share, g2=2.0)
+
+
 @dataclass(frozen=True)
 class Motion:
     """Primary and secondary motion (m) over time (s): real displacements, or complex amplitudes."""

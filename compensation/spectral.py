@@ -105,6 +105,50 @@ def separate(numerator: Array, stable: Array, antistable: Array) -> Array:
     return t / scale ** np.arange(n, -1, -1.0)
 
 
+@dataclass(frozen=True)
+class CrossSpectrum:
+    """A rational cross-spectral density S_φΩ(s) = E{Ω φ*}, of any parity; S_Ωφ(s) = S_φΩ(−s). No pole is on the imaginary axis."""
+
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+
+    def split_poles(self) -> tuple[Array, Array]:
+        """Return the factors of the denominator with roots to the left (with its leading factor) and to the right."""
+        p = np.trim_zeros(np.asarray(self.denominator, dtype=float), "f")
+        roots = np.roots(p)
+        if np.any(np.abs(roots.real) <= 1e-9 * np.abs(roots)):
+            raise CompensationError("a cross-spectral density has a pole on the imaginary axis; give it a corner frequency.")  # fmt: skip
+        left, right = (np.atleast_1d(np.poly(roots[side]).real) for side in (roots.real < 0, roots.real > 0))
+        return np.asarray(p[0] * left, dtype=float), np.asarray(right, dtype=float)
+
+
+def require_possible(one: Spectrum, other: Spectrum, cross: CrossSpectrum | None) -> None:
+    """Raise when two signals' coherence |S_φΩ|²/(S_φ S_Ω), largest at ω² = 0, ∞ or where its derivative vanishes, is above 1."""
+    if cross is None:
+        return
+    cross.split_poles()
+    mixed, below = (np.trim_zeros(np.asarray(p, dtype=float), "f") for p in (cross.numerator, cross.denominator))
+    if not len(mixed):
+        return
+    # |p(jω)|² = p(s) p(−s); s² = −x
+    tops = multiply(mixed, reflect(mixed), np.array(one.denominator), np.array(other.denominator))
+    bottoms = multiply(below, reflect(below), np.array(one.numerator), np.array(other.numerator))
+    top, bottom = (np.trim_zeros(p[::2] * (-1.0) ** np.arange(len(p[::2]))[::-1], "f") for p in (tops, bottoms))
+    slope = np.asarray(np.polysub(np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom))), float)
+    roots = np.roots(np.trim_zeros(slope, "f"))
+    still = roots.real[(np.abs(roots.imag) <= 1e-6 * np.abs(roots)) & (roots.real > 0)]
+    scale = float(np.max(np.abs(np.r_[np.roots(top), np.roots(bottom)]), initial=1.0))
+    x = np.r_[still, scale * np.geomspace(1e-9, 1e9, 37)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        coherence = np.nan_to_num(np.abs(np.polyval(top, x) / np.polyval(bottom, x)), nan=0.0, posinf=np.inf)
+    worst = int(np.argmax(coherence))
+    if coherence[worst] > 1 + 1e-6:
+        raise CompensationError(
+            f"rate and noise have a coherence |S_φΩ|²/(S_φ S_Ω) of {coherence[worst]:.3g} at {np.sqrt(x[worst]):.3g} rad/s; no two"
+            " signals have more than 1. Lower the cross-spectral density, or raise the noise's own."
+        )
+
+
 def _sign(polynomial: tuple[float, ...], frequency: Array) -> Array:
     """Sign of an even polynomial at jω; 0 where rounding decides it."""
     terms = np.array(polynomial)[:, None] * (1j * frequency) ** np.arange(len(polynomial) - 1, -1, -1)[:, None]
