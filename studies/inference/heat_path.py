@@ -196,13 +196,13 @@ def find_heat_path(
         if path is None:
             progress(words)
             path = max((_calibrated(lean, card) for card in cards), key=lambda one: one.evidence)
-            if not leaves_thermometer_noise(path.fit):
-                if number == 1 and lags is None and slow_share(path.fit) > FOLLOWED:
-                    grows = _calibrated(lean, with_lags(whole.instrument, [lag], True))
-                    path = grows if grows.evidence > path.evidence + WORTH else path
-                if is_ahead(path.fit) or slow_share(path.fit) > FOLLOWED:
-                    progress(f"{words}, its sensor late")
-                    path = max(path, _calibrated(lean, with_late_sensor(path.card)), key=lambda one: one.evidence)
+            wanders = slow_share(path.fit) > FOLLOWED and not leaves_thermometer_noise(path.fit)
+            if number == 1 and lags is None and wanders:
+                grows = _calibrated(lean, with_lags(whole.instrument, [lag], True))
+                path = grows if grows.evidence > path.evidence + WORTH else path
+            if wanders or is_ahead(path.fit):
+                progress(f"{words}, its sensor late")
+                path = max(path, _calibrated(lean, with_late_sensor(path.card)), key=lambda one: one.evidence)
             tried[number, lumps] = path
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
@@ -229,7 +229,7 @@ def is_ahead(found: CardFit) -> bool:
     """Whether the resonator is ahead of its sensor, by more than clocks and sensors usually make; without a delay, whether slow noise may be that."""
     priors = found.problem.priors
     if DELAY not in priors.names or FREQUENCY not in found.noise:
-        return slow_share(found) > FOLLOWED
+        return slow_share(found) > FOLLOWED and not leaves_thermometer_noise(found)
     return bool(found.away[priors.names.index(DELAY)] < -SURE_SHARE)
 
 

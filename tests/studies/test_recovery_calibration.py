@@ -276,9 +276,9 @@ def test_of_further_levels_as_many_as_stated_lie_within_what_three_runs_tell(spr
 
 @pytest.mark.slow
 def test_limits_levels_far_above_the_noise_are_stated_as_students_t_has_them(card):
-    """Four levels of standard deviation s: a fifth is within t s of their mean, beside that mean's own s/2."""
+    """Three levels of standard deviation s: a fourth is within t s of their mean, beside that mean's own s/√3."""
     _, ((levels, saved),) = calibrated_with_levels(card, 100, 0.02)
-    expected = t.ppf(0.975, 3) * np.std(levels[1:], ddof=1) / norm.ppf(0.975)
+    expected = t.ppf(0.975, 2) * np.std(levels[1:], ddof=1) / norm.ppf(0.975)
     assert saved.part("posterior").frequency_level_Hz == pytest.approx(expected, rel=0.1)
 
 
