@@ -26,6 +26,7 @@ from studies.simulation.prediction import predict
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
+    from studies.simulation.prediction import Prediction
     from thermal.profile import Profile
 
 INITIAL = "initial."
@@ -52,14 +53,13 @@ class Start:
         return {c: np.asarray(np.linalg.norm(np.transpose(J) @ self.root, axis=1)) for c, J in slopes.items()}
 
 
-def misread(instrument: "Instrument", drive: "Drive", law: "FrequencyLaw") -> dict[str, float]:
-    """Return what the noise of the housing's readings, which drive a run, makes of every column, rms: as one draw of it does."""
-    read = drive.profile.value
+def misread(instrument: "Instrument", predicted: "Prediction", law: "FrequencyLaw") -> dict[str, Array]:
+    """Return what one draw of the noise of the housing's readings, which drive a run, changes in every column; that of the first is how the run began."""
+    drive, read = predicted.drive, predicted.drive.profile.value
     noise = white_rms(read) if drive.boundary == "housing" else 0.0
     draw = np.append(0.0, np.random.default_rng(0).standard_normal(len(read) - 1))
-    drawn = replace(drive.profile, value=read + noise * draw)
-    alone, other = (predict(instrument, one, law=law).columns for one in (drive, replace(drive, profile=drawn)))
-    return {column: float(np.sqrt(np.mean((other[column] - own) ** 2))) for column, own in alone.items()}
+    drawn = replace(drive, profile=replace(drive.profile, value=read + noise * draw))
+    return {c: own - predicted.columns[c] for c, own in predict(instrument, drawn, law=law).columns.items()}
 
 
 def begin(

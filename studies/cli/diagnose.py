@@ -68,8 +68,9 @@ def _plan(profiles: list[str], card: str | None, limits: Chamber | None) -> Resu
     from studies.reports import plan as parts
 
     for path in profiles:
-        if Path(path).is_file() and set(OUTPUTS) & set(read_header(path)):
-            what = "record of a run" if "time_s" in read_header(path) else "steady-state table"
+        header = read_header(path) if Path(path).is_file() else []
+        if set(OUTPUTS) & set(header):
+            what = "record of a run" if "time_s" in header else "steady-state table"
             raise InputError(f"{path}: this is a {what}; --plan takes profiles of runs to come. Leave out --plan to diagnose it; of records, --next then proposes a run.")  # fmt: skip
     if card is None:
         say(f"no --card given: planning with the card {PLANNED}.")

@@ -67,14 +67,14 @@ def simulate(
     for warning in run.warnings:
         say(f"warning: {warning}")
     keep_record(run.record, out)
-    widths: list[tuple[str, float, float, float]] = []
+    widths: list[tuple[str | float, ...]] = []
     if spread:
         by_card = spread_of_prediction(instrument, run.prediction.drive, run.law)
         by_start = begun.spread(instrument, run.prediction.drive, run.law) if begun else {}
-        by_readings = misread(instrument, run.prediction.drive, run.law) if begun else {}
+        by_readings = misread(instrument, run.prediction, run.law) if begun else {}
         for name in [name for name in by_card if name in run.record]:
-            parts = _rms(by_card[name]), _rms(by_start.get(name, 0.0)), by_readings.get(name, 0.0)
-            widths.append((name, float(np.linalg.norm(parts)), *parts[1:]))
+            alone, *parts = (_rms(own.get(name, 0.0)) for own in (by_card, by_start, by_readings))
+            widths.append((name, float(np.linalg.norm([alone, *parts])), *parts))
     summary = {
         "card": instrument.name,
         "out": out,

@@ -19,7 +19,6 @@ from studies.errors import InputError
 from studies.inference.diagnosis import build_problem
 from studies.inference.heat_path import (
     DELAY,
-    FOLLOWED,
     LAGS,
     OF_LUMPS,
     SENSOR,
@@ -29,9 +28,9 @@ from studies.inference.heat_path import (
     by_thermometer,
     cubic_of,
     find_heat_path,
-    leaves_thermometer_noise,
     left_rms,
     slow_share,
+    wanders,
 )
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.records import driving, make_ready
@@ -130,8 +129,7 @@ def fit_thermal_constants(
 
     path = find(law | {"delay_s": {"value": 0.0, "sd": 0.0}})
     share, error = path.value(SHARE)
-    wanders = slow_share(path.fit) > FOLLOWED and not leaves_thermometer_noise(path.fit)
-    if lags is None and (abs(share) > SURE_SHARE * error or wanders):
+    if lags is None and (abs(share) > SURE_SHARE * error or wanders(path.fit)):
         # Seconds by which a sensor or a clock is late look like radiation, or like slow noise.
         late = find(law)
         path = late if late.evidence > path.evidence + WORTH else path

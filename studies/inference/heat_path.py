@@ -196,11 +196,10 @@ def find_heat_path(
         if path is None:
             progress(words)
             path = max((_calibrated(lean, card) for card in cards), key=lambda one: one.evidence)
-            wanders = slow_share(path.fit) > FOLLOWED and not leaves_thermometer_noise(path.fit)
-            if number == 1 and lags is None and wanders:
+            if number == 1 and lags is None and wanders(path.fit):
                 grows = _calibrated(lean, with_lags(whole.instrument, [lag], True))
                 path = grows if grows.evidence > path.evidence + WORTH else path
-            if wanders or is_ahead(path.fit):
+            if wanders(path.fit) or is_ahead(path.fit):
                 progress(f"{words}, its sensor late")
                 path = max(path, _calibrated(lean, with_late_sensor(path.card)), key=lambda one: one.evidence)
             tried[number, lumps] = path
@@ -229,7 +228,7 @@ def is_ahead(found: CardFit) -> bool:
     """Whether the resonator is ahead of its sensor, by more than clocks and sensors usually make; without a delay, whether slow noise may be that."""
     priors = found.problem.priors
     if DELAY not in priors.names or FREQUENCY not in found.noise:
-        return slow_share(found) > FOLLOWED and not leaves_thermometer_noise(found)
+        return wanders(found)
     return bool(found.away[priors.names.index(DELAY)] < -SURE_SHARE)
 
 
@@ -275,6 +274,11 @@ def by_thermometer(found: CardFit) -> float:
 def leaves_thermometer_noise(found: CardFit) -> bool:
     """Whether a path leaves no more than the noise of the housing's readings makes: a longer one would follow the frequency closer only for smoothing that."""
     return left_rms(found) < THERMOMETER * by_thermometer(found)
+
+
+def wanders(found: CardFit) -> bool:
+    """Whether a path leaves slow noise that the noise of the housing's readings does not make."""
+    return slow_share(found) > FOLLOWED and not leaves_thermometer_noise(found)
 
 
 def slow_share(found: CardFit, name: str = FREQUENCY) -> float:
