@@ -118,17 +118,20 @@ def settle_rebalance(
     rows = wave.over_rows(shape[0])
     turning, azimuth, turned = (np.broadcast_to(np.asarray(x, dtype=float), shape) for x in (rate, angle, turn))
     A = rows.envelope(turning, azimuth)
-    c, s = np.cos(rows.harmonic * azimuth), np.sin(rows.harmonic * azimuth)
+    angles, at = np.unique(
+        azimuth, return_inverse=True
+    )  # what the electronics make of a wave depends on its azimuth alone
+    c, s = np.cos(rows.harmonic * angles), np.sin(rows.harmonic * angles)
     R = np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
     back = np.swapaxes(R, 1, 2)
     pickoff = back @ electronics.pickoff.matrix(rows.harmonic) @ R
     drive = back @ electronics.drive.matrix(rows.harmonic) @ R
-    moved, across = np.moveaxis(np.linalg.inv(pickoff), -1, 0)[..., None]
-    needed = wave.harmonic * turned[:, None, None] * across - A @ moved
-    nulling = moved[:, ::-1, 0] if electronics.actuators.stiff else drive[:, :, 1]
-    acting = np.stack([drive[:, :, 0], drive[:, :, 1], 1j * nulling, -1j * moved[..., 0]], axis=-1)
-    whole = np.concatenate([acting.real, acting.imag], axis=1)
-    decay, held, quadrature, nu = np.linalg.solve(whole, np.concatenate([needed.real, needed.imag], axis=1))[..., 0].T
+    moved, across = np.moveaxis(np.linalg.inv(pickoff), -1, 0)
+    nulling = moved[:, ::-1] if electronics.actuators.stiff else drive[:, :, 1]
+    acting = np.stack([drive[:, :, 0], drive[:, :, 1], 1j * nulling, -1j * moved], axis=-1)
+    answer = np.linalg.inv(np.concatenate([acting.real, acting.imag], axis=1))[at]
+    needed = wave.harmonic * turned[:, None] * across[at] - np.einsum("nij,nj->ni", A, moved[at])
+    decay, held, quadrature, nu = np.einsum("nij,nj->in", answer, np.concatenate([needed.real, needed.imag], axis=1))
     return LoopRun(
         np.arange(shape[0], dtype=float), -held / rows.coupling, quadrature, decay, rows.omega + nu, azimuth.copy()
     )
