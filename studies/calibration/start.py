@@ -12,7 +12,7 @@ import numpy as np
 
 from compensation.arrays import Array
 from compensation.noise import white_rms
-from studies.calibration.ahead import spread_of_prediction
+from studies.calibration.ahead import spread_along, spread_of_prediction
 from studies.calibration.fit import covariance_at, descend, fit
 from studies.calibration.observed import MOST_BLOCKS, RESPONSES, observe
 from studies.calibration.priors import Priors
@@ -48,9 +48,7 @@ class Start:
 
     def spread(self, instrument: "Instrument", drive: "Drive", law: "FrequencyLaw") -> dict[str, Array]:
         """Return √diag(J C Jᵀ) of every column of a predicted run, C of its start."""
-        found = predict(instrument, drive, [INITIAL + part for part in self.departures], law)
-        slopes = {c: [found.derivatives[INITIAL + part][c] for part in self.departures] for c in found.columns}
-        return {c: np.asarray(np.linalg.norm(np.transpose(J) @ self.root, axis=1)) for c, J in slopes.items()}
+        return spread_along(instrument, drive, [INITIAL + part for part in self.departures], self.root, law)
 
 
 def misread(instrument: "Instrument", predicted: "Prediction", law: "FrequencyLaw") -> dict[str, Array]:
