@@ -127,9 +127,7 @@ class ResponseResult:
     @property
     def gain(self) -> float | None:
         """Baseline over extended held-out residual."""
-        if self.extended is None or not self.extended[1] or self.baseline[1] is None:
-            return None
-        return self.baseline[1] / self.extended[1]
+        return gain_of(self.baseline[1], self.extended[1]) if self.extended else None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of the contract."""
@@ -213,6 +211,11 @@ def spell_structure(input_: str) -> str:
     """Return what is left over in words, from "temperature: a narrow feature": a narrow feature in temperature."""
     place, _, what = input_.partition(": ")
     return what if what and place == "time" else f"{what or 'structure'} in {place}"
+
+
+def gain_of(before: float | None, after: float | None) -> float | None:
+    """Return by how much causes lower what is left; None where that is not known."""
+    return before / after if before is not None and after else None
 
 
 def overall(verdicts: Sequence[str]) -> str:

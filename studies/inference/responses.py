@@ -9,7 +9,7 @@ from compensation.noise import Noise, white_rms
 from studies.calibration.noise_levels import LASTING, stated_noise
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import RESPONSES
-from studies.diagnosis.verdict import Cause, ResponseResult
+from studies.diagnosis.verdict import Cause, ResponseResult, gain_of
 from studies.inference.causes import SURE_DELAY, delay_of, farthest
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import LAST_DIGIT, doubt_of
@@ -77,6 +77,8 @@ def _judge(
             f"the slow part of the residual is {slow:.2g} times {SLOW_THAN[_stated(found, name) is not None]}: these records cannot"
             " distinguish slow noise from a cause that acts slowly"
         ) + (apart and f"; {apart}")
+    if mine and left.doubtful and (gain_of(*found.held_out[name]) or 1.0) < CONSTANTS["patching"]:  # a patch
+        return "not-identifiable", doubt_of(left.input, left.evidence)
     if terms or mine:
         return ("not-identifiable" if patched or any(cause.equivalent for cause in mine) else "explained"), apart
     if values:

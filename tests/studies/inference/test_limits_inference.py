@@ -9,6 +9,7 @@ import scipy
 
 from compensation.noise import Noise
 from studies.calibration.fit import fit
+from studies.inference import responses
 from studies.inference.background import Background
 from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import build_problem
@@ -277,3 +278,19 @@ def test_two_levels_are_found_and_their_switches_cost_what_a_chain_gives():
     split, cost = switching([rows])
     left = np.var(rows) - np.cov(rows, split, bias=True)[0, 1] ** 2 / np.var(split)
     assert cost < -250 * np.log(np.var(rows) / left)
+
+
+@pytest.mark.parametrize(
+    ("gain", "doubtful", "verdict"),
+    [(1.016, True, "not-identifiable"), (2.0, True, "explained"), (1.016, False, "explained")],
+)
+def test_a_name_that_hardly_predicts_better_beside_doubtful_structure_explains_nothing(
+    monkeypatch, gain, doubtful, verdict
+):
+    monkeypatch.setattr(responses, "_apart", lambda *_: "")
+    left = SimpleNamespace(
+        significant=False, doubtful=doubtful, input="time: an intermittent oscillation", evidence=7.7
+    )
+    found = SimpleNamespace(left={"frequency_Hz": left}, held_out={"frequency_Hz": (gain, 1.0)})
+    cause = SimpleNamespace(probability=0.74, equivalent=())
+    assert responses._judge(found, "frequency_Hz", True, [cause], False, 0.0, None)[0] == verdict
