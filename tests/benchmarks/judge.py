@@ -12,8 +12,8 @@ the data folder: asked again with it, another commit answers to the same bytes. 
 stranger   the independent generator, without a card: effects, pairs, nulls, causes outside the library in turn
 card       the virtual gyro of a shipped card that hides one effect or none, with the card
 device     the virtual gyro of a card whose values are drawn from their stated widths; `hrg calibrate` answers too
-folder     examinations by others: `truth.json` beside `cases/NAME/run_*.csv`; five independent examiners' generators write such folders:
-           python tests/benchmarks/hands/distributed.py|bang_bang.py|pi_chamber.py|dead_band.py|places.py OUT --count 100 --seed S
+folder     examinations by others: `truth.json` beside `cases/NAME/run_*.csv`; six independent examiners' generators write such folders:
+           python tests/benchmarks/hands/distributed.py|bang_bang.py|pi_chamber.py|dead_band.py|places.py|stations.py OUT --count 100 --seed S
 measured   data that nobody of this project wrote: answers are listed, not marked
 
 A row is a share of old and of new with 90 % bands (Wilson); `lost` and `won` count campaigns that changed, and a row is worse
