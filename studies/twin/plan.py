@@ -168,6 +168,8 @@ def _shell_and_mount(instrument: "Instrument", parameters: dict[str, float]) -> 
         emissivity=1.0,
         base_capacity=growing(1.0, instrument.thermal.base_capacity_slope_per_K),
         housing_capacity=1.0,
+        second_mass=1.0 if path.second_mass else 0.0,
+        second_mass_conductance=1.0,
         mount_conductance=1.0,
         mount_exchange=1e-4,
         chamber_conductance=1.0,
