@@ -118,9 +118,8 @@ def settle_rebalance(
     rows = wave.over_rows(shape[0])
     turning, azimuth, turned = (np.broadcast_to(np.asarray(x, dtype=float), shape) for x in (rate, angle, turn))
     A = rows.envelope(turning, azimuth)
-    angles, at = np.unique(
-        azimuth, return_inverse=True
-    )  # what the electronics make of a wave depends on its azimuth alone
+    # what the electronics make of a wave depends on its azimuth alone
+    angles, at = np.unique(azimuth, return_inverse=True)
     c, s = np.cos(rows.harmonic * angles), np.sin(rows.harmonic * angles)
     R = np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
     back = np.swapaxes(R, 1, 2)
