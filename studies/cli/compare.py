@@ -1,13 +1,20 @@
 """`hrg compare`: designs side by side."""
 
 from math import isfinite
+from typing import Any
 
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.given import shorten
 from studies.instrument.card import load_card
+from studies.resonator.comparison import Comparison, Setting
 from studies.resonator.comparison import compare as compare_designs
 from studies.results import Column, Result, Table, row_of
+
+SETTINGS = (
+    "What a simulation takes; ±: the standard deviation that the card states. —: the card does not state it and it has no"
+    " default; it follows from geometry and material, or there is no such thing."
+)
 
 
 @answers("hrg.compare/1")
@@ -25,14 +32,11 @@ def compare(*card: str) -> Result:
         | {"values": [one.value for one in row], "uncertainties": [one.uncertainty for one in row]}
         for row in found.figures
     ]
-    payload = {"cards": found.names, "figures": figures, "differing": found.differing}
+    payload = {"cards": found.names, "figures": figures, **_differing(found)}
     names = [f"{name} ({k})" if found.names.count(name) > 1 else name for k, name in enumerate(found.names, 1)]
     note = "±: one standard deviation from the published values of the material, common to designs of one material."
     known = [row | {"values": [v if isfinite(v) else "not known" for v in row["values"]]} for row in figures]
-    keys = [
-        {"key": key, "values": ["—" if value is None else shorten(str(value), 40) for value in values]}
-        for key, values in found.differing.items()
-    ]
+    keys = [{"key": key, "values": [_spell(one) for one in row]} for key, row in found.differing.items()]
     return Result(
         payload,
         "Comparison of designs",
@@ -44,7 +48,32 @@ def compare(*card: str) -> Result:
             ], note),
             *(f"{row[0].name.capitalize()}: {'; '.join(f'{name}: {one.of}' for name, one in zip(names, row, strict=True))}."
                 for row in found.figures if row[0].of),
-            Table("Where the cards differ", keys, ["key", *(Column(f"values.{k}", name) for k, name in enumerate(names))]),
+            Table("Where the cards differ", keys, ["key", *(Column(f"values.{k}", name) for k, name in enumerate(names))], SETTINGS),
             None if keys else "The cards are the same.",
         ],
     )  # fmt: skip
+
+
+def _differing(found: Comparison) -> dict[str, Any]:
+    """Values of the keys that differ, and beside each what its card states of the uncertainty; None where it states no value."""
+    ends = ("sd", "low", "high")
+    stated = {
+        key: [
+            None if one.by_default else {end: x for end in ends if (x := getattr(one, end)) is not None} for one in row
+        ]
+        for key, row in found.differing.items()
+    }
+    return {"differing": {key: [one.value for one in row] for key, row in found.differing.items()}, "stated": stated}
+
+
+def _spell(one: Setting) -> str:
+    """Write a setting: 0.1 ± 0.03, 0.05 … 0.2, or 0.0118 (default)."""
+    if one.value is None:
+        return "—"
+    deviation = "" if one.sd is None else f" ± {one.sd:.4g}"
+    ends = (
+        ""
+        if one.low is None and one.high is None
+        else f", {'' if one.low is None else one.low} … {'' if one.high is None else one.high}"
+    )
+    return shorten(str(one.value), 40) + deviation + ends + (" (default)" if one.by_default else "")

@@ -4,11 +4,11 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache, reduce
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
-from msgspec import NODEFAULT, inspect
+from msgspec import inspect
 
 from studies.errors import InputError, nearest
 from studies.instrument.uncertain import Given, UncertainValue, read_uncertain
@@ -152,18 +152,6 @@ def possible_keys(content: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
         for entry in entries if isinstance(raw, Mapping) else ():
             if entry.keys is not None:
                 found |= {name: bounds(one.type) for name, one in _fields(describe(entry.keys), raw, table)}
-    return found
-
-
-def default_keys(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the defaults of the keys in the tables that this card has, by their dotted names."""
-    found: dict[str, Any] = {}
-    for table, raw in content.items():
-        for entry in card_tables().get(table, ()) if isinstance(raw, Mapping) else ():
-            for name, one in _fields(describe(entry.keys), raw, table):
-                inside = name.count(".") == 1 or reduce(lambda at, key: at.get(key, {}), name.split(".")[1:-1], raw)
-                if inside and not one.required and one.default not in (NODEFAULT, None):
-                    found[name] = one.default
     return found
 
 

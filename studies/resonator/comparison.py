@@ -1,14 +1,14 @@
 """Designs side by side: what differs in their cards, and what that does to modes, slope, settling and loss."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
-from studies.instrument.registry import default_keys
+from studies.instrument.uncertain import is_spread
 from studies.progress import told
 from studies.resonator.law import law_of
 from studies.results.shown import Shown
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 HARMONICS = (0, 1, 2, 3)
 DRIVE = 2
-UNTOLD = ("schema", "name", "note")
 REFERENCE = "reference_temperature_degC"
 
 
@@ -35,13 +34,24 @@ class Figure:
     of: str = ""  # what it is a quantity of, where designs differ in that
 
 
+@dataclass(frozen=True)
+class Setting:
+    """What a simulation takes for a key of the card: its value (None: there is none), and what the card states of its uncertainty."""
+
+    value: Any = None
+    sd: float | None = None
+    low: float | None = None
+    high: float | None = None
+    by_default: bool = field(default=True, compare=False)  # what has no value is stated by nobody
+
+
 @dataclass(frozen=True, repr=False)
 class Comparison(Shown):
-    """Designs and their figures, in one order; `differing` card keys with their values, by default or given (None: not in that card)."""
+    """Designs and their figures, in one order; `differing` the keys of cards whose settings are not the same in all."""
 
     names: tuple[str, ...]
     figures: tuple[tuple[Figure, ...], ...]
-    differing: Mapping[str, tuple[Any, ...]]
+    differing: Mapping[str, tuple[Setting, ...]]
 
     def __repr__(self) -> str:
         return f"Comparison({', '.join(self.names)}: {len(self.figures)} quantities, {len(self.differing)} keys differ)"
@@ -61,10 +71,9 @@ class Comparison(Shown):
 
 def compare(instruments: "Sequence[Instrument]") -> Comparison:
     """Compute the figures of designs and find the keys in which their cards differ."""
-    keys = [{REFERENCE: one.reference_temperature - zero_Celsius, **dict(_flatten(one.content))} for one in instruments]
-    names = dict.fromkeys(name for one in keys for name in one)
-    known = [default_keys(one.content) | stated for one, stated in zip(instruments, keys, strict=True)]
-    differing = {name: tuple(one.get(name) for one in known) for name in names}
+    known = [_settings(one) for one in instruments]
+    names = dict.fromkeys(name for one in known for name in one)
+    differing = {name: tuple(one.get(name, Setting()) for one in known) for name in names}
     return Comparison(
         tuple(one.name for one in instruments),
         tuple(zip(*(tuple(_figures(one)) for one in told(instruments, "designs")), strict=True)),
@@ -101,10 +110,27 @@ def _figures(instrument: "Instrument") -> Iterator[Figure]:
     yield Figure("lag behind the housing", "s", lag, nothing)
 
 
-def _flatten(content: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    if isinstance(content, Mapping):
+def _settings(instrument: "Instrument") -> dict[str, Setting]:
+    """Return every key that counts in this card with what was read of it, defaults too, by dotted names."""
+    from msgspec import to_builtins
+
+    said = dict(_flatten(instrument.content, ""))
+    found = {REFERENCE: Setting(instrument.reference_temperature - zero_Celsius, by_default=REFERENCE not in said)}
+    for given in (one for table in instrument.tables.values() for one in table.given):
+        deviations = {one.name: one.sd for one in given.stated.values()}
+        for name, value in _flatten(to_builtins(given.keys), given.name):
+            if value is not None and not name.endswith(".note"):
+                raw = said.get(name)
+                ends = (raw.get("low"), raw.get("high")) if is_spread(raw) else (None, None)
+                found[name] = Setting(value, deviations.get(name), *ends, by_default=name not in said)
+    return found
+
+
+def _flatten(content: Any, name: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(content, list) and content and all(isinstance(one, Mapping) for one in content):
+        content = dict(enumerate(content))
+    if isinstance(content, Mapping) and not is_spread(content):
         for key, value in content.items():
-            if name or key not in UNTOLD:
-                yield from _flatten(value, f"{name}.{key}" if name else key)
+            yield from _flatten(value, f"{name}.{key}" if name else str(key))
     else:
         yield name, content

@@ -2,6 +2,9 @@
 
 import pytest
 
+from studies.cli import main
+from studies.instrument.card import load_card
+
 
 def test_figures_are_those_of_the_other_commands(tmp_path, ask):
     card = tmp_path / "thin.toml"
@@ -24,6 +27,33 @@ def test_figures_are_those_of_the_other_commands(tmp_path, ask):
         assert frequency["uncertainties"][place] == pytest.approx(mode["material_uncertainty_Hz"], rel=1e-3)
         point = ask(["tcf", name, "--from", "20", "--to", "20"])["points"][0]
         assert figures["slope"]["values"][place] == pytest.approx(point["slope_ppm_per_degC"], rel=1e-4)
+
+
+def test_settings_are_those_of_the_simulation(tmp_path, ask, capsys):
+    """Contract: what differs is what a simulation reads, `Instrument.keys`, stated with a deviation, without one, or by default."""
+    bare = tmp_path / "bare.toml"
+    bare.write_text(
+        'schema = "hrg.card/1"\nname = "bare"\n[resonator]\nshape = "hemisphere"\nradius_mm = 15.0\nthickness_mm = 0.8\n'
+        '[material]\nname = "fused-silica"\n'
+    )
+    spread = tmp_path / "spread.toml"
+    spread.write_text(
+        bare.read_text() + "[thermal]\nmount_conductance_W_per_K = { value = 0.05, sd = 0.01 }\nnote = 'of the foot'\n"
+        "[loss]\ninverse_q = { value = 1e-7, low = 0.5e-7, high = 2e-7 }\n[[effect]]\nname = 'rate-bias'\ncoefficient_deg_per_h_per_K_per_s = 2.0\n"
+    )
+    found = ask(["compare", str(bare), str(spread)])
+    default = load_card(bare).thermal.mount_conductance_W_per_K
+    assert found["differing"]["thermal.mount_conductance_W_per_K"] == [default, 0.05]
+    assert found["stated"]["thermal.mount_conductance_W_per_K"] == [None, {"sd": 0.01}]
+    assert found["differing"]["loss.inverse_q"] == [1e-7, 1e-7]
+    assert found["stated"]["loss.inverse_q"][1].items() >= {"low": 0.5e-7, "high": 2e-7}.items()
+    assert found["differing"]["effect.0.coefficient_deg_per_h_per_K_per_s"] == [None, 2.0]
+    assert {name.split(".")[0] for name in found["differing"]} == {"thermal", "loss", "effect"}
+    assert "thermal.note" not in found["differing"]
+    main(["compare", str(bare), str(spread)])
+    shown = capsys.readouterr().out
+    assert f"{default} (default)" in shown
+    assert "0.05 ± 0.01" in shown
 
 
 def test_nearest_mode_lies_behind_many_lower_ones():
