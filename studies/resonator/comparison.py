@@ -121,8 +121,8 @@ def _settings(instrument: "Instrument") -> dict[str, Setting]:
         for name, value in _flatten(to_builtins(given.keys), given.name):
             if value is not None and not name.endswith(".note"):
                 raw = said.get(name)
-                ends = (raw.get("low"), raw.get("high")) if is_spread(raw) else (None, None)
-                found[name] = Setting(value, deviations.get(name), *ends, by_default=name not in said)
+                ends = raw if isinstance(raw, Mapping) else {}
+                found[name] = Setting(value, deviations.get(name), ends.get("low"), ends.get("high"), name not in said)
     return found
 
 
