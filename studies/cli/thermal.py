@@ -60,7 +60,7 @@ def thermal(
     housed = {"time_s": time, "chamber_temperature_degC": chamber.at(time) - zero_Celsius}
     payload = {
         "card": instrument.name,
-        "radiation": not network.is_linear,
+        "radiation": bool(network.radiators),
         "time_constants_s": whole.time_constants,
         "shell_and_stem_time_constants_s": alone.time_constants,
         "slowest_time_constant_sensitivity": influence,
@@ -82,7 +82,7 @@ def thermal(
             Table("Sensitivity of the slowest time constant τ to each constant p", list(influence.items())[:6],
                 [Column("0", "constant", spell=name_constant), "1: d ln τ / d ln p +.3f"]),
             Figure(lambda: _curves(transient, chamber, weights, names), "Temperatures in time."),
-            Table("Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
+            Table("Temperatures (°C)" + (", with radiation" if network.radiators else ", radiation linearised"),
                 rows_of(housed | temperatures), [f"time_s: time (s) .{0 if time[1] - time[0] >= 10 else 1}f | chamber_temperature_degC: chamber .3f", *(f"{name}: {name} .3f" for name in names)],
                 "Shell: mean temperature." + f" The heat balance closes within {energy.error:.0e} of the heat exchanged." * (energy.turnover > 0)),
         ],

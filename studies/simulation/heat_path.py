@@ -27,7 +27,7 @@ LEAST_LAG, UNREAD = 1e-3, 1.0  # s; of a sensor without a lag, whose reading is 
 
 
 def build_network(instrument: "Instrument", radiation: bool | None = None, boundary: str = "chamber") -> Network:
-    """Build the heat path from the "chamber", or "housing", to the cells of the shell; without radiation it is linear about the reference."""
+    """Build the heat path from the "chamber", or "housing", to the cells of the shell; without radiation that is conduction, as about the reference; capacities stay."""
     if instrument.polynomial is not None:
         network = lags_in_series(instrument.polynomial, radiation is not False)
         return behind_housing(network) if boundary == "housing" else network
@@ -36,7 +36,7 @@ def build_network(instrument: "Instrument", radiation: bool | None = None, bound
     if boundary == "housing":
         network = behind_housing(network)
     wanted = instrument.thermal.radiation if radiation is None else radiation
-    return network if wanted else linearise(network, instrument.reference_temperature)
+    return network if wanted else replace(linearise(network, instrument.reference_temperature), nodes=network.nodes)
 
 
 def behind_housing(network: Network) -> Network:

@@ -23,6 +23,7 @@ from studies.simulation.heat_path import build_network, build_shell_and_stem, sl
 from studies.simulation.noise import bias_noise, quantise
 from studies.simulation.response import cell_weights, to_cells
 from studies.simulation.virtual_gyro import simulate_run
+from thermal.radiative import simulate
 from thermal.relaxation import find_relaxation
 
 CARD = """
@@ -277,6 +278,19 @@ def test_rounding_rounds():
     assert quantise(np.array([4432.0749, 4432.0751]), 0.01) == pytest.approx([4432.07, 4432.08])
     values = np.array([0.123456789])
     assert quantise(values, 0.0) is values
+
+
+def test_a_base_whose_capacity_grows_does_so_without_radiation():
+    """Limit: where nothing radiates, a run is the same whether radiation is linearised or not."""
+    heat = {"film_emissivity": 0.0, "mount_exchange_cm2": 0.0, "base_capacity_slope_per_K": 2e-3, "cells": 4}
+    networks = [
+        build_network(load_card("hrg-30mm").with_table("thermal", {**heat, "radiation": radiates}))
+        for radiates in (True, False)
+    ]
+    runs = [simulate(one, {"chamber": load_profile("step 20 80 5h")}) for one in networks]
+    time = np.linspace(0.0, 18000.0, 50)
+    base, same = (run.node("base", time) for run in runs)
+    assert base == pytest.approx(same, abs=1e-9)
 
 
 def test_what_the_shell_radiates_past_its_base_and_a_base_whose_capacity_grows():

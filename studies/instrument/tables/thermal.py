@@ -28,7 +28,7 @@ class Thermal(Keys, frozen=True, kw_only=True):
     second_mass_J_per_K: Annotated[float, number("of a part that hangs on the base, with its conductance", above=0.0, relative_sd=1.0, example=5.0)] | None = None  # fmt: skip
     second_mass_conductance_W_per_K: Annotated[float, number("base to that part", above=0.0, relative_sd=1.0, example=0.002)] | None = None  # fmt: skip
     drive_power_mW: Annotated[float, number("heat of the vibration, spread over the shell", least=0.0)] = 0.0
-    radiation: Annotated[bool, says("false: linearised at the reference temperature")] = True
+    radiation: Annotated[bool, says("false: linearised at the reference temperature; heat capacities are not")] = True
     cells: Annotated[
         float, number("of the shell's meridian; 1 makes it a lump, which the stem always is", least=1.0, most=400.0)
     ] = 24

@@ -23,7 +23,6 @@ double twin_spline(const TwinSpline *s, double x, double *slope) {
 
 static double capacity(const Twin *w, int i, double T) {
     const TwinCapacity *own = twin_capacities + i;
-    if (TWIN_LINEAR) T = TWIN_REFERENCE;
     if (own->parameter == P_thermal_heat_capacity_J_per_kg_K && twin_heat_capacity.count)
         return own->factor * twin_spline(&twin_heat_capacity, T, NULL);
     return own->factor * w->p[own->parameter] * (own->slope != 0 ? exp(own->slope * (T - TWIN_AROUND)) : 1);
@@ -31,7 +30,7 @@ static double capacity(const Twin *w, int i, double T) {
 
 static double node(const double *T, double boundary, int i) { return i < N ? T[i] : boundary; }
 
-/* Heat (W) into the nodes; with `linear`, radiation and capacities are those at that temperature. */
+/* Heat (W) into the nodes; with `linear`, radiation is that about that temperature. */
 static void inflow(const Twin *w, const double *T, double boundary, double linear, double *heat) {
     memcpy(heat, w->power, sizeof w->power);
     for (int part = 0; part < 2; ++part) {
