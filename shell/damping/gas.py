@@ -31,28 +31,37 @@ R = 8.314462618  # J/(mol K)
 
 @dataclass(frozen=True)
 class Gas:
-    """A gas: molar mass (kg/mol), viscosity μ₀ (Pa s) at T₀ (K), and Sutherland's constant S (K)."""
+    """A gas: molar mass (kg/mol), viscosity μ₀ (Pa s) at T₀ (K), Sutherland's constant S (K), and c_p/c_v."""
 
     name: str
     molar_mass: float
     viscosity: float
     at: float
     sutherland: float
+    heats: float
 
     def viscosity_at(self, temperature: float) -> float:
         """Sutherland's law μ = μ₀ (T/T₀)^1.5 (T₀ + S)/(T + S), Pa s."""
         ratio = temperature / self.at
         return float(self.viscosity * ratio**1.5 * (self.at + self.sutherland) / (temperature + self.sutherland))
 
+    def density_at(self, pressure: float, temperature: float) -> float:
+        """Of an ideal gas, p M/(R T), kg/m³."""
+        return pressure * self.molar_mass / (R * temperature)
 
-# viscosities and Sutherland constants: White, Viscous Fluid Flow, table 1-2
+    def sound_at(self, temperature: float) -> float:
+        """Speed of sound of an ideal gas, √((c_p/c_v) R T/M), m/s."""
+        return sqrt(self.heats * R * temperature / self.molar_mass)
+
+
+# viscosities, Sutherland constants, ratios of heat capacities: White, Viscous Fluid Flow, tables 1-2 and A-2
 GASES = {
     gas.name: gas
     for gas in (
-        Gas("air", 0.0289652, 1.716e-5, 273.0, 111.0),
-        Gas("nitrogen", 0.0280134, 1.663e-5, 273.0, 107.0),
-        Gas("argon", 0.039948, 2.125e-5, 273.0, 144.0),
-        Gas("hydrogen", 0.00201588, 8.411e-6, 273.0, 97.0),
+        Gas("air", 0.0289652, 1.716e-5, 273.0, 111.0, 1.40),
+        Gas("nitrogen", 0.0280134, 1.663e-5, 273.0, 107.0, 1.40),
+        Gas("argon", 0.039948, 2.125e-5, 273.0, 144.0, 1.667),
+        Gas("hydrogen", 0.00201588, 8.411e-6, 273.0, 97.0, 1.41),
     )
 }
 
@@ -92,8 +101,7 @@ def free_impedance(pressure: ArrayLike, molar_mass: float, temperature: ArrayLik
 def viscous_loss(vibration: Vibration, gas: Gas, pressure: float, temperature: float) -> float:
     """1/Q from the viscous layer on the faces; the gas flows around as fast as the wall moves along its normal."""
     omega = float(vibration.omega(temperature))
-    density = pressure * gas.molar_mass / (R * temperature)
-    resistance = sqrt(density * gas.viscosity_at(temperature) * omega / 2)
+    resistance = sqrt(gas.density_at(pressure, temperature) * gas.viscosity_at(temperature) * omega / 2)
     slip = 0.0
     for face in vibration.faces:
         out = vibration.resonator.outward * (1 if face.kind == "outer" else -1)

@@ -6,7 +6,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from shell.constants import zero_Celsius
+from shell.damping.gas import GASES, Gas
 from shell.duffing import amplitude_shift
+from shell.gas_inertia import gas_shift
 from shell.loads import Kind, Loads
 from shell.modes import Mode, solve_modes
 from shell.spin import SpinShift, spin_shift
@@ -61,7 +63,8 @@ def loads(
         along: Acceleration of the base along the axis, from rim to pole of a dome, in g; 1: the gyro stands upright.
         across: Acceleration of the base across the axis in g.
         rotation: Rate of rotation about the axis in °/s.
-        pressure: Pressure of the gas around the resonator in kPa.
+        pressure: Pressure of the gas around the resonator in kPa: its stress, and the inertia of the gas that moves with the wall
+            where it is free on both sides; the gas is that of [loss] gas, air unless given.
         gradient: Temperature of the base minus that of the free end in °C, linear along the meridian.
         strength: Strength in MPa that the largest stress is compared with.
     """
@@ -85,11 +88,15 @@ def loads(
             raise InputError("no load is given; --along 1 is an acceleration of 1 g along the axis.")
 
         spin = spin_shift(mode, elastic) if rotation else None
+        around = GASES[instrument.part("loss", "loss_parts").gas]
+        moved = gas_shift(mode, around, 1e3 * pressure, T) if pressure else 0j
 
         def shift(kind: Kind, units: float) -> float:
             if kind == "spin":
                 return units * spin.total if spin else 0.0
-            return gradient * shift_per_kelvin(instrument, found, T) if kind == "cooling" else units * found.shift(kind)
+            if kind == "cooling":
+                return gradient * shift_per_kelvin(instrument, found, T)
+            return units * found.shift(kind) + (moved.real if kind == "pressure" else 0.0)
 
         every: dict[Kind, float] = {kind: units for kind, _, _, units in given.values()}
         shifts = {kind: shift(kind, units) for kind, units in every.items()}
@@ -106,6 +113,7 @@ def loads(
         stem, tilted = found.beam(g * along, g * across), bias_by_tilt(instrument, found, T)
         nonlinear = _amplitudes(instrument, harmonic, lay_temperatures(from_degC, to_degC, step))
     waves = spin and _waves(mode, spin, radians(rotation))
+    gas = _gas(found, around, 1e3 * pressure, T, moved) if pressure else None
     bias = row_of(tilted, "deg_per_h_per_g", "azimuth_deg", gap_nm_per_g=("gap", 1e9)) if tilted else None
     worst = max(whole["tension_MPa"], whole["mises_MPa"], 1e-6 * stem)
     safety = None if strength is None else strength / worst
@@ -119,7 +127,7 @@ def loads(
     payload = {
         "card": instrument.name, "temperature_degC": T - zero_Celsius, "harmonic": harmonic,
         "frequency_Hz": mode.frequency, "loads": rows, "stem_MPa": 1e-6 * stem or None, "safety": safety,
-        "per_g": per_g, "waves": waves, "bias": bias, "amplitude": nonlinear,
+        "per_g": per_g, "waves": waves, "gas": gas, "bias": bias, "amplitude": nonlinear,
     }  # fmt: skip
     beam = f"The stem as a beam has {1e-6 * stem:.3g} MPa at its clamped end, by its axial force and its bending moment under these accelerations."
     return Result(
@@ -130,6 +138,7 @@ def loads(
             Facts(_facts(worst, strength, safety, per_g)),
             Table("Loads", rows, COLUMNS, ABROAD.format(root=" and at the root" if "root" in found.counted else "")),
             WAVES.format(**waves) if waves else None,
+            GAS.format(**gas) if gas else None,
             beam if stem else None,
             _bias_words(instrument, bias),
             Table("Coefficient of the amplitude (Duffing)", nonlinear, AMPLITUDE, NONLINEAR),
@@ -140,6 +149,11 @@ def loads(
 WAVES = (
     "Rotation: two travelling waves at {lower_Hz:.5f} and {upper_Hz:.5f} Hz in the frame of the resonator (Bryan's effect). Their mean shifts by"
     " {stress_ppm:+.3g} ppm by stress, {centrifugal_ppm:+.3g} by centrifugal softening and {coriolis_ppm:+.3g} by Coriolis forces."
+)
+GAS = (
+    "Pressure: {elastic_ppm:+.4g} ppm by stress, and {inertia_ppm:+.4g} ppm by the inertia of {gas} ({density_kg_m3:.4g} kg/m³) that moves with the wall, whose"
+    " sound takes 1/Q = {sound_inverse_q:.2g}. The gas is taken as free on both sides. A surface that faces the wall at a distance g, as electrodes and"
+    " housing do, is not included: it multiplies the inertia on its side by about {reach_mm:.3g} mm/g and keeps the sound in."
 )
 AMPLITUDE = (
     "temperature_degC: T (°C) .1f | shift_Hz_per_um2: shift per square of the largest displacement (Hz/µm²) +.5g"
@@ -164,6 +178,18 @@ def _waves(mode: Mode, spin: SpinShift, omega: float) -> dict[str, float]:
     apart = mode.harmonic * abs(mode.bryan_factor * omega) / (2 * pi)
     ppm = {f"{name}_ppm": (name, 1e6 * omega**2) for name in ("stress", "centrifugal", "coriolis")}
     return {"lower_Hz": mean - apart, "upper_Hz": mean + apart} | row_of(spin, **ppm)
+
+
+def _gas(found: Loads, gas: Gas, pressure: float, temperature: float, moved: complex) -> dict[str, Any]:
+    """Parts of the shift by a gas; `reach_mm` R/n, how far it moves."""
+    return {
+        "gas": gas.name,
+        "density_kg_m3": gas.density_at(pressure, temperature),
+        "elastic_ppm": 1e6 * pressure * found.shift("pressure"),
+        "inertia_ppm": 1e6 * moved.real,
+        "sound_inverse_q": -2 * moved.imag,
+        "reach_mm": 1e3 * found.mode.resonator.size / found.mode.harmonic,
+    }
 
 
 def _under(found: Loads, amounts: dict[Kind, float], shift: float) -> dict[str, Any]:
