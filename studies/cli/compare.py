@@ -7,7 +7,8 @@ from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.given import shorten
 from studies.instrument.card import load_card
-from studies.resonator.comparison import Comparison, Setting
+from studies.instrument.settings import Setting
+from studies.resonator.comparison import Comparison
 from studies.resonator.comparison import compare as compare_designs
 from studies.results import Column, Result, Table, row_of
 

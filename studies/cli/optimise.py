@@ -14,6 +14,7 @@ from studies.design.run import CARD, TABLE, best_instrument
 from studies.design.run import optimise as find_best
 from studies.design.task import shown
 from studies.errors import numbered
+from studies.instrument.settings import settings_of
 from studies.reports import style
 from studies.reports.digits import plain
 from studies.reports.scenes import moving_mode, show_mode
@@ -40,6 +41,7 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
         **row_of(found, "evaluations", design="task.name", card="task.study.instrument.name"),
         "failed": len(found.failures),
         "parameters": _parameters(found),
+        "defaults": _defaults(found),
         "columns": _columns(found),
         "constraints": [
             row_of(one, "column", "limit", "value", "room", "margin", "price")
@@ -69,6 +71,17 @@ def _parameters(found: Answer) -> list[dict[str, Any]]:
         at = "low" if best - p.low < near else "high" if p.high - best < near else None
         rows.append(row_of(p, "name", "low", "high") | {"start": float(start), "best": float(best), "at_bound": at})
     return rows
+
+
+def _defaults(found: Answer) -> dict[str, Any]:
+    """What neither card nor task states, of the resonator and of parameters and tolerances, and stands at its default."""
+    task = found.task
+    stated = {one.name for one in task.study.derived} | {p.name for p in task.keys.parameter if p.start is not None}
+    return {
+        name: one.value
+        for name, one in settings_of(task.study.instrument).items()
+        if one.by_default and name not in stated and (name in task.study.names or name.startswith("resonator."))
+    }
 
 
 def _columns(found: Answer) -> list[dict[str, Any]]:
@@ -112,6 +125,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         for k, limits in [(found.task.place(name), [one.limit for one in found.limits if one.column == name])]
     ]
     keys = found.task.study.names[: found.task.free]
+    defaults = ", ".join(f"{name} = {value}" for name, value in payload["defaults"].items())
     front = [Column(itemgetter(name), name.removeprefix("resonator."), digits=5) for name in keys]
     front += [Column(itemgetter(name), named[name], digits=6) for name in found.task.wanted]
     return [
@@ -123,6 +137,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
                 Column(lambda row: row["name"].removeprefix("resonator."), "parameter"),
                 "start: before .7 | best: best .7 | low: lowest | high: highest | at bound",
             ]),
+            f"Neither the card nor the design states what stands at its default: {defaults}. A parameter among these starts there." if defaults else None,
             Table("Before and after", payload["columns"], [
                 "label: quantity", Column(lambda row: row["unit"] if row["unit"] != "1" else None, "unit"),
                 "start: before .6 | interpolant: best, interpolated .7 | best: best, full solve .7",
@@ -148,7 +163,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
             Table("Effect of the tolerances", payload["tolerances"], [
                 Column(lambda row: named[row["column"]], "quantity"),
                 "value: value .6 | worst_case: worst case ± .3 | sd: standard deviation .3 | low … high: full solves .6 | passed: within limits (%) ×100 .1f",
-            ], "Worst case and standard deviation to first order; full solves: the extremes among the worst corners and designs drawn from the tolerances."),
+            ], "Worst case and standard deviation to first order; a tolerance given by its standard deviation is normal, its worst case three of it. Full solves: the extremes among the worst corners and designs drawn from the tolerances."),
         ]),
         Chapter("Search", [
             Figure(lambda: _draw_history(found), "Objective, and violation of the limits, of each design in the order in which they were computed."),

@@ -254,6 +254,10 @@ def _distribution(parameter: StudyParameter) -> str:
     if parameter.values:
         return "values"
     if parameter.distribution == "normal":
-        unbounded = "" if parameter.bounded else ", unbounded"
-        return f"normal, standard deviation {analysis.number(parameter.standard_deviation)}{unbounded}"
+        ends = (
+            f"cut off at the ends of the range: {parameter.drawn_deviation:.4g} drawn"
+            if parameter.bounded
+            else "unbounded"
+        )
+        return f"normal, standard deviation {analysis.number(parameter.standard_deviation)}, {ends}"
     return parameter.distribution + (f", {parameter.count} points" if parameter.count else "")

@@ -158,7 +158,8 @@ def tolerance_table(results: Results, found: Mapping[str, Any]) -> Table:
         p = asked[one["name"]]
         label = figures.label(p.name, p.unit)
         if p.standard_deviation is not None:
-            ends = f"σ = {number(p.standard_deviation)}", f"σ = {one['standard_deviation']:.4g}"
+            drawn = f", {p.drawn_deviation:.4g} within {number(p.low)} … {number(p.high)}" if p.bounded else ""
+            ends = f"σ = {number(p.standard_deviation)}{drawn}", f"σ = {one['standard_deviation']:.4g}"
         else:
             ends = f"{number(p.low)} … {number(p.high)}", f"{one['low']:.6g} … {one['high']:.6g}"
         rows.append({"label": label, "asked": ends[0], "found": ends[1]})

@@ -1,14 +1,13 @@
 """Designs side by side: what differs in their cards, and what that does to modes, slope, settling and loss."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
-from studies.instrument.uncertain import is_spread
+from studies.instrument.settings import Setting, settings_of
 from studies.progress import told
 from studies.resonator.law import law_of
 from studies.results.shown import Shown
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 
 HARMONICS = (0, 1, 2, 3)
 DRIVE = 2
-REFERENCE = "reference_temperature_degC"
 
 
 @dataclass(frozen=True)
@@ -32,17 +30,6 @@ class Figure:
     value: float
     uncertainty: float
     of: str = ""  # what it is a quantity of, where designs differ in that
-
-
-@dataclass(frozen=True)
-class Setting:
-    """What a simulation takes for a key of the card: its value (None: there is none), and what the card states of its uncertainty."""
-
-    value: Any = None
-    sd: float | None = None
-    low: float | None = None
-    high: float | None = None
-    by_default: bool = field(default=True, compare=False)  # what has no value is stated by nobody
 
 
 @dataclass(frozen=True, repr=False)
@@ -71,7 +58,7 @@ class Comparison(Shown):
 
 def compare(instruments: "Sequence[Instrument]") -> Comparison:
     """Compute the figures of designs and find the keys in which their cards differ."""
-    known = [_settings(one) for one in instruments]
+    known = [settings_of(one) for one in instruments]
     names = dict.fromkeys(name for one in known for name in one)
     differing = {name: tuple(one.get(name, Setting()) for one in known) for name in names}
     return Comparison(
@@ -108,29 +95,3 @@ def _figures(instrument: "Instrument") -> Iterator[Figure]:
     except InputError:  # no source states the material's heat capacity or conductivity
         lag = nothing
     yield Figure("lag behind the housing", "s", lag, nothing)
-
-
-def _settings(instrument: "Instrument") -> dict[str, Setting]:
-    """Return every key that counts in this card with what was read of it, defaults too, by dotted names."""
-    from msgspec import to_builtins
-
-    said = dict(_flatten(instrument.content, ""))
-    found = {REFERENCE: Setting(instrument.reference_temperature - zero_Celsius, by_default=REFERENCE not in said)}
-    for given in (one for table in instrument.tables.values() for one in table.given):
-        deviations = {one.name: one.sd for one in given.stated.values()}
-        for name, value in _flatten(to_builtins(given.keys), given.name):
-            if value is not None and not name.endswith(".note"):
-                raw = said.get(name)
-                ends = raw if isinstance(raw, Mapping) else {}
-                found[name] = Setting(value, deviations.get(name), ends.get("low"), ends.get("high"), name not in said)
-    return found
-
-
-def _flatten(content: Any, name: str) -> Iterator[tuple[str, Any]]:
-    if isinstance(content, list) and content and all(isinstance(one, Mapping) for one in content):
-        content = dict(enumerate(content))
-    if isinstance(content, Mapping) and not is_spread(content):
-        for key, value in content.items():
-            yield from _flatten(value, f"{name}.{key}" if name else str(key))
-    else:
-        yield name, content

@@ -33,6 +33,16 @@ class StudyParameter:
         """The unit that the name carries, or "1"."""
         return unit_of(self.name)
 
+    @property
+    def drawn_deviation(self) -> float:
+        """Standard deviation of what is drawn of a normal one: less than the stated where its ends cut it off."""
+        from scipy.stats import truncnorm
+
+        stated, middle = self.standard_deviation or 0.0, float(self.nominal)
+        if not self.bounded:
+            return stated
+        return float(truncnorm.std((self.low - middle) / stated, (self.high - middle) / stated, scale=stated))
+
 
 @dataclass(frozen=True)
 class Study:

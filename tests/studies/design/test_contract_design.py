@@ -85,6 +85,15 @@ def test_what_a_study_computes_can_be_wanted(tmp_path, column):
     assert column in read_task(write(tmp_path, asked)).wanted
 
 
+def test_a_key_that_the_card_leaves_out_starts_at_its_default(tmp_path):
+    """Contract: what a design starts from, free or with a tolerance, is what a simulation of the card takes."""
+    rim = '\n[[{}]]\nname = "resonator.rim_angle_deg"\n{}\n'
+    for table, keys in (("parameter", "low = 80.0\nhigh = 100.0"), ("tolerance", "standard_deviation = 0.1")):
+        task = read_task(write(tmp_path, TASK + rim.format(table, keys)))
+        taken = load_card("free-dome").keys("resonator").rim_angle_deg
+        assert task.named(task.start)["resonator.rim_angle_deg"] == taken == 90.0
+
+
 @pytest.mark.slow
 def test_contradicting_limits_and_an_objective_without_value_are_said(tmp_path, refuse):
     out = ["--out", str(tmp_path / "out"), "--workers", "1", "--quiet"]
@@ -118,6 +127,10 @@ def test_a_run_resumes_and_the_best_card_holds_what_was_asked(tmp_path, ask, ref
     rows = {row["column"]: row for row in said["columns"]}
     assert rows["frequency_n2_Hz"]["verified"] == pytest.approx(frequency, rel=1e-12)
     assert rows["frequency_n2_Hz"]["interpolant"] == pytest.approx(frequency, rel=1e-4)
+    assert said["defaults"] == {
+        f"resonator.{key}": value
+        for key, value in (("support", "free"), ("rim_angle_deg", 90.0), ("pole_angle_deg", 0.0))
+    }
     best = {row["name"]: row["best"] for row in said["parameters"]}
     assert best["resonator.thickness_mm"] == pytest.approx(round(best["resonator.thickness_mm"], 2), abs=1e-12)
     lines = (out / "evaluations.csv").read_text().splitlines()

@@ -63,7 +63,7 @@ def test_shipped_specs_are_read(name):
         (("parameter", 1, "low"), 15.05, ("nominal", "outside")),
         (("parameter", 1, "count"), 5, ("grid",)),
         (("parameter", 1), {"name": "resonator.radius_mm", "values": [15.0]}, ("grid", "list")),
-        (("parameter", 1), {"name": "resonator.pole_angle_deg"}, ("nominal",)),
+        (("parameter", 1), {"name": "thermal.stem_length_mm"}, ("nominal",)),
         (("parameter", 1), {"name": "temperature_degC", "low": -300, "high": 20}, ("outside the range",)),
         (("quantity", 0, "name"), "frequencies", ("frequency",)),
         (("quantity", 0, "temperature_degC"), 2000, ("outside the range",)),

@@ -67,10 +67,13 @@ def test_same_seed_same_design_another_seed_another():
     ],
 )
 def test_samples_follow_their_distribution(keys, law):
-    _, found = design("sobol", {"name": "user.a", **keys}, cases=4096, seed=5)
+    study, found = design("sobol", {"name": "user.a", **keys}, cases=4096, seed=5)
     quantiles = law.cdf(found[:, 0])
     # points of a Sobol sequence lie within 1/N of the uniform law
     assert np.abs(np.sort(quantiles) - (np.arange(4096) + 0.5) / 4096).max() < 1 / 4096
+    if "standard_deviation" in keys:  # what the page says is drawn
+        assert study.parameters[0].drawn_deviation == pytest.approx(law.std(), rel=1e-9)
+        assert np.std(found[:, 0]) == pytest.approx(law.std(), rel=2e-3)
 
 
 def test_saltelli_mixes_one_column_at_a_time():
