@@ -35,6 +35,7 @@ def settings_of(instrument: "Instrument") -> dict[str, Setting]:
         for name, value in _flatten(to_builtins(given.keys), given.name):
             if value is not None and not name.endswith(".note"):
                 raw = said.get(name)
+                value = raw if isinstance(raw, list) else value  # with what is said of the numbers inside
                 ends = raw if isinstance(raw, Mapping) else {}
                 found[name] = Setting(value, deviations.get(name), ends.get("low"), ends.get("high"), name not in said)
     return found

@@ -24,9 +24,10 @@ from shell.damping.budget import (
     thermoelastic_cause,
 )
 from shell.damping.faces import Vibration
-from shell.damping.gas import GASES, gas_loss, most_squeezed
+from shell.damping.gas import GASES, gas_loss, mean_free_path, most_squeezed
 from shell.damping.heat import Heat
 from shell.damping.sources import known_losses
+from shell.gas_inertia import gas_shift
 from shell.imperfection import Pair
 from shell.layout import Theory
 from shell.modes import Mode
@@ -98,7 +99,7 @@ def loss_model(
             causes += found
             ripples += waves
         ripples += _surface_ripple(parts, vibration, causes)
-        causes += _others(instrument, vibration, parts, spread, left_out)
+        causes += _others(instrument, mode, vibration, parts, spread, left_out)
         causes += _ohmic(instrument, mode)
         first, third = _rim_harmonics(instrument, parts)
         if anchor or first or third:
@@ -201,7 +202,7 @@ _unbalance = lru_cache(maxsize=8)(unbalance_loss)  # kept, since many values of 
 
 
 def _others(
-    instrument: Instrument, vibration: Vibration, parts: LossParts, spread: Mapping[str, float],
+    instrument: Instrument, mode: Mode, vibration: Vibration, parts: LossParts, spread: Mapping[str, float],
     left_out: list[str],
 ) -> list[LossCause]:  # fmt: skip
     """Gas, activated losses, and what leaves through the mount as the card gives it."""
@@ -210,11 +211,15 @@ def _others(
         left_out.append("gas: give pressure_Pa of the sealed housing.")
     elif parts.pressure_Pa > 0:
         sd = spread.get("loss.pressure_Pa", 0.0)
-        causes.append(gas_cause(vibration, GASES[parts.gas], parts.pressure_Pa, sd, parts.accommodation))
+        gas, p, T0 = GASES[parts.gas], parts.pressure_Pa, vibration.reference
+        causes.append(gas_cause(vibration, gas, p, sd, parts.accommodation))
+        if mode.theory == "solid" and mode.harmonic and mean_free_path(gas, p, T0) < vibration.resonator.size:
+            sound = -2 * gas_shift(mode, gas, p, T0).imag
+            left_out.append(f"sound: a closed housing keeps it in; in the open it adds 1/Q = {sound:.2g}.")
         if "electrodes" in instrument.content:
-            keys, p, T0 = instrument.part("electrodes").keys, parts.pressure_Pa, vibration.reference
+            keys = instrument.part("electrodes").keys
             most = most_squeezed(vibration, keys.face, 1e-6 * keys.gap_um, p, T0)
-            times = most / gas_loss(vibration, GASES[parts.gas], p, T0, parts.accommodation)
+            times = most / gas_loss(vibration, gas, p, T0, parts.accommodation)
             words = "gas squeezed in the gap of the electrodes, most of it near their ends: it adds at most"
             left_out.append(f"{words} 1/Q = {most:.2g} at {keys.gap_um:g} µm, {times:.2g} times the gas counted.")
     for number, peak in enumerate(parts.activated):

@@ -50,6 +50,10 @@ def test_settings_are_those_of_the_simulation(tmp_path, ask, capsys):
     assert found["differing"]["effect.0.coefficient_deg_per_h_per_K_per_s"] == [None, 2.0]
     assert {name.split(".")[0] for name in found["differing"]} == {"thermal", "loss", "effect"}
     assert "thermal.note" not in found["differing"]
+    profile = tmp_path / "profile.toml"
+    profile.write_text(bare.read_text().replace("0.8", "[[0, 0.8], [1, { value = 0.8, sd = 0.01 }]]"))
+    found = ask(["compare", str(bare), str(profile)])
+    assert found["differing"] == {"resonator.thickness_mm": [0.8, [[0, 0.8], [1, {"value": 0.8, "sd": 0.01}]]]}
     main(["compare", str(bare), str(spread)])
     shown = capsys.readouterr().out
     assert f"{default} (default)" in shown
