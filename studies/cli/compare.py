@@ -1,14 +1,12 @@
 """`hrg compare`: designs side by side."""
 
 from math import isfinite
-from typing import Any
 
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.given import shorten
 from studies.instrument.card import load_card
 from studies.instrument.settings import Setting
-from studies.resonator.comparison import Comparison
 from studies.resonator.comparison import compare as compare_designs
 from studies.results import Column, Result, Table, row_of
 
@@ -33,7 +31,10 @@ def compare(*card: str) -> Result:
         | {"values": [one.value for one in row], "uncertainties": [one.uncertainty for one in row]}
         for row in found.figures
     ]
-    payload = {"cards": found.names, "figures": figures, **_differing(found)}
+    payload = {"cards": found.names, "figures": figures} | {
+        name: {key: [getattr(one, what) for one in row] for key, row in found.differing.items()}
+        for name, what in (("differing", "value"), ("stated", "stated"))
+    }
     names = [f"{name} ({k})" if found.names.count(name) > 1 else name for k, name in enumerate(found.names, 1)]
     note = "±: one standard deviation from the published values of the material, common to designs of one material."
     known = [row | {"values": [v if isfinite(v) else "not known" for v in row["values"]]} for row in figures]
@@ -55,26 +56,12 @@ def compare(*card: str) -> Result:
     )  # fmt: skip
 
 
-def _differing(found: Comparison) -> dict[str, Any]:
-    """Values of the keys that differ, and beside each what its card states of the uncertainty; None where it states no value."""
-    ends = ("sd", "low", "high")
-    stated = {
-        key: [
-            None if one.by_default else {end: x for end in ends if (x := getattr(one, end)) is not None} for one in row
-        ]
-        for key, row in found.differing.items()
-    }
-    return {"differing": {key: [one.value for one in row] for key, row in found.differing.items()}, "stated": stated}
-
-
 def _spell(one: Setting) -> str:
     """Write a setting: 0.1 ± 0.03, 0.05 … 0.2, or 0.0118 (default)."""
     if one.value is None:
         return "—"
-    deviation = "" if one.sd is None else f" ± {one.sd:.4g}"
-    ends = (
-        ""
-        if one.low is None and one.high is None
-        else f", {'' if one.low is None else one.low} … {'' if one.high is None else one.high}"
-    )
-    return shorten(str(one.value), 40) + deviation + ends + (" (default)" if one.by_default else "")
+    if one.stated is None:
+        return f"{shorten(str(one.value), 40)} (default)"
+    deviation = f" ± {one.stated['sd']:.4g}" if "sd" in one.stated else ""
+    low, high = (one.stated.get(end, "") for end in ("low", "high"))
+    return shorten(str(one.value), 40) + deviation + (f", {low} … {high}" if (low, high) != ("", "") else "")

@@ -80,7 +80,7 @@ def _defaults(found: Answer) -> dict[str, Any]:
     return {
         name: one.value
         for name, one in settings_of(task.study.instrument).items()
-        if one.by_default and name not in stated and (name in task.study.names or name.startswith("resonator."))
+        if one.stated is None and name not in stated and (name in task.study.names or name.startswith("resonator."))
     }
 
 

@@ -1,7 +1,7 @@
 """What a simulation takes for every key of a card: stated there, or by default."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from shell.constants import zero_Celsius
@@ -15,13 +15,15 @@ REFERENCE = "reference_temperature_degC"
 
 @dataclass(frozen=True)
 class Setting:
-    """What a simulation takes for a key of the card: its value (None: there is none), and what the card states of its uncertainty."""
+    """What a simulation takes for a key of the card: its value, and what the card states beside it: `sd`, `low`, `high`; None where it does not state the key."""
 
-    value: Any = None
-    sd: float | None = None
-    low: float | None = None
-    high: float | None = None
-    by_default: bool = field(default=True, compare=False)  # what has no value is stated by nobody
+    value: Any = None  # None: there is none
+    stated: Mapping[str, float] | None = None
+
+    @property
+    def counts(self) -> tuple[Any, Mapping[str, float]]:
+        """What makes a difference: not whether the value is stated."""
+        return self.value, self.stated or {}
 
 
 def settings_of(instrument: "Instrument") -> dict[str, Setting]:
@@ -29,16 +31,21 @@ def settings_of(instrument: "Instrument") -> dict[str, Setting]:
     from msgspec import to_builtins
 
     said = dict(_flatten(instrument.content, ""))
-    found = {REFERENCE: Setting(instrument.reference_temperature - zero_Celsius, by_default=REFERENCE not in said)}
+    found: dict[str, Any] = {REFERENCE: instrument.reference_temperature - zero_Celsius}
+    beside: dict[str, dict[str, float]] = {}
     for given in (one for table in instrument.tables.values() for one in table.given):
-        deviations = {one.name: one.sd for one in given.stated.values()}
-        for name, value in _flatten(to_builtins(given.keys), given.name):
-            if value is not None and not name.endswith(".note"):
-                raw = said.get(name)
-                value = raw if isinstance(raw, list) else value  # with what is said of the numbers inside
-                ends = raw if isinstance(raw, Mapping) else {}
-                found[name] = Setting(value, deviations.get(name), ends.get("low"), ends.get("high"), name not in said)
-    return found
+        beside |= {one.name: {"sd": one.sd} for one in given.stated.values()}
+        found |= dict(_flatten(to_builtins(given.keys), given.name))
+    for name, raw in said.items():
+        if is_spread(raw):
+            beside[name] |= {end: raw[end] for end in ("low", "high") if end in raw}
+        elif isinstance(raw, list):
+            found[name] = raw  # with what is said of the numbers inside
+    return {
+        name: Setting(value, beside.get(name, {}) if name in said else None)
+        for name, value in found.items()
+        if value is not None and not name.endswith(".note")
+    }
 
 
 def _flatten(content: Any, name: str) -> Iterator[tuple[str, Any]]:

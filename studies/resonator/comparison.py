@@ -64,7 +64,7 @@ def compare(instruments: "Sequence[Instrument]") -> Comparison:
     return Comparison(
         tuple(one.name for one in instruments),
         tuple(zip(*(tuple(_figures(one)) for one in told(instruments, "designs")), strict=True)),
-        {name: values for name, values in differing.items() if any(value != values[0] for value in values)},
+        {key: row for key, row in differing.items() if any(one.counts != row[0].counts for one in row)},
     )
 
 
