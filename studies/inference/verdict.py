@@ -46,7 +46,7 @@ def judge(found: Inferred) -> Verdict:
     for name in found.search.linear.responses:
         if results[name].verdict == "not-identifiable" and name not in told:
             candidates = candidates_of(found, name)
-            named += tuple(candidates)
+            named += tuple(one for one in candidates if one.evidence > 0.0)
             if not candidates and found.card.polynomial is None and is_slow(found, name):
                 results[name] = replace(results[name], verdict="unexplained")  # nothing known is slow in this way
     return Verdict(

@@ -92,6 +92,7 @@ def test_an_answer_is_whole(place, folder):
     assert evidence == sorted(evidence, reverse=True)
     for cause in found["causes"]:
         assert 0.0 < cause["probability"] < 1.0
+        assert cause["evidence"] > 0.0, "nothing speaks for it"
         assert all(value["low"] <= value["value"] <= value["high"] for value in cause["parameters"].values())
     for one in judged:
         assert (one["extended"] is None) >= (one["verdict"] == "adequate")
