@@ -44,6 +44,7 @@ MOST_SOLVES = 300  # of a family
 COLDEST, WARMEST = -40.0, 80.0  # °C
 DEGREE = 32  # of the series over temperature
 MARGIN = 1e-3  # of ν beyond its range over temperature
+ROUNDING = 1e-9  # the least error that is told
 
 
 def live_blocks(
@@ -64,7 +65,7 @@ def live_blocks(
         "outline": "the displacements shown to {:.2g} % of the largest",
     }
     errors = [f"f to {1e6 * f:.2g} ppm", f"the other modes to {100 * max(others, default=0.0):.2g} %"]
-    errors += [words[name].format(100 * error) for name, error in data["fields"]["errors"].items()]
+    errors += [words[name].format(100 * max(error, ROUNDING)) for name, error in data["fields"]["errors"].items()]
     caption = (
         f"Interpolated between full solves ({theory} theory, one layout of elements) and checked against others within the sliders' ranges: {', '.join(errors)}."
         " f: without imperfection and electrodes. The picture shows the reference temperature. Other modes: of n = 0 …"
