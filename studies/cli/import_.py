@@ -45,7 +45,7 @@ def import_(
     counted and left as they are, unless the map says drop. Raw decays become files for hrg fit ringdown (pickoff_cos_V, power_dBm …). An --out that ends in .parquet is a Parquet file.
 
     Args:
-        raw: Text with any separator, Excel workbooks, TDMS, MDF, HDF5, MATLAB or Parquet, in the map's order.
+        raw: Text with any separator (.gz too), Excel workbooks, TDMS, MDF, HDF5, MATLAB or Parquet, in the map's order.
         map_: The map (schema hrg.map/1): columns, units, signs, clocks, resampling.
         out: The record to write (.csv or .parquet).
         draft: Draft a map from the files instead; an existing file is not overwritten.
@@ -113,6 +113,7 @@ def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | Non
             Table("First rows", rows, [Column(key, key, form=".10g") for key in found], where="page"),
         ]))  # fmt: skip
     payload |= {"notes": notes, **more}
+    checks = [Sentence(note, "note") for note in notes if "CHECK" in note]
     chapters.append(Chapter("Changes", [Sentence("\n".join(notes), "source")]))
     lead = "The data as converted. Compare them with what you know about the run before you use them."
-    return Result(payload, "Import", lead, chapters)
+    return Result(payload, "Import", lead, [*checks, *chapters])

@@ -10,7 +10,8 @@ import numpy as np
 from compensation.arrays import Array
 from studies.errors import InputError, numbered
 from studies.files.given import shorten
-from studies.files.stored import PORTION, Stored
+from studies.files.stored import PORTION, Stored, portions
+from studies.importing.daylight import find_change
 from studies.importing.mapping import NUMERIC_TIMES, OWN, SECONDS, UNIX, FileMap
 from studies.importing.tables import RawTable
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 _EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
 _UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 _HALF_DAY = 43200.0
+DECIMAL_COMMA = r"(?<=\d),(?=\d)"
 _ZONE = r"(?:[Zz]|[+-]\d\d:?\d\d)$"
 LONGEST_RUN = 10 * 365.25 * 86400.0  # s
 
@@ -83,6 +85,10 @@ class Clock:
         if zone and self.form in SECONDS and self.origin is not None:  # it has a local start only
             self.origin = _with_offset(self.origin, self.origin.replace(tzinfo=zoneinfo.ZoneInfo(zone)).utcoffset())
             zone = None
+        local = self.origin is not None and self.origin.tzinfo is None and file.sample_period is None
+        if self.origin is not None and local and not zone and self.form not in SECONDS:
+            changes = (find_change(self.origin, seconds[max(k.start - 1, 0) : k.stop]) for k in portions(len(seconds)))
+            self.notes += [f"CHECK: {change[1]}" for change in changes if change]
         rate = file.clock_rate_ppm * 1e-6 if file.sample_period is None else 0.0
         if not (zone or rate or file.clock_offset):
             return seconds
@@ -126,7 +132,7 @@ class Clock:
         file, name = self.file, " ".join(self.file.time)
         text = table.joined(file.time)
         empty = np.asarray(text == "")
-        plain = text.str.replace(",", ".", regex=False) if file.decimal == "," else text
+        plain = text if "," in self.form else text.str.replace(DECIMAL_COMMA, ".", regex=True)
         form = "ISO8601" if self.form == "iso" else self.form
         plain = plain.mask(empty)
         zoned = "%z" in form or (form == "ISO8601" and bool(plain.dropna().str.contains(_ZONE).any()))

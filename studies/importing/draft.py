@@ -5,20 +5,23 @@ import re
 import statistics
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from studies.errors import InputError
 from studies.files.given import shorten
 from studies.importing.channels import is_container, open_channels, sort_groups
+from studies.importing.daylight import find_change
 from studies.importing.draft_columns import comment_of, draft_column, draft_unknown, find_markers, guess_meanings
 from studies.importing.join import read_series, shift_between
-from studies.importing.look import Look, as_number, find_nominal, find_period, is_stamp, look_at, look_at_group, parting
+from studies.importing.look import Look, find_nominal, find_period, is_stamp, look_at, look_at_group
 from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
-from studies.importing.meaning import Meaning, find_meanings
+from studies.importing.meaning import find_meanings
+from studies.importing.notation import is_number
 from studies.importing.offset import estimate_offset
 from studies.importing.resampling import ClockedFile
-from studies.importing.sheets import list_sheets
-from studies.importing.timing import TIME_WORDS, find_time
+from studies.importing.timing import TIME_WORDS, find_time, parse_stamps
 from studies.schema.keys import spell_value
 from studies.schema.reader import read_keys
 
@@ -160,21 +163,20 @@ def _draft_table(path: str) -> tuple[list[str], tuple[str, ...]] | None:
     look = look_at(path)
     if look.header is None or any(re.search(TIME_WORDS, name.lower()) for name in look.names):
         return None
-    body = look.rows[look.data :]
+    body = look.body
     above = _lines_above(look)
     if any(is_stamp(cell) for row in body[:5] for cell in row) or find_period(above) is not None:
         return None
-    hints = {name: f"{name} {unit}".strip() for name, unit in zip(look.names, look.units, strict=True)}
-    by_target = {meaning.target: name for name, meaning in find_meanings(hints).items()}
+    hints, numbers = look.hints, look.numbers
+    meanings = find_meanings(hints, numbers)
+    by_target = {meaning.target: name for name, meaning in meanings.items()}
     temperature = by_target.get("housing_temperature_degC") or by_target.get("chamber_temperature_degC")
     if temperature is None or "frequency_Hz" not in by_target or len(body) > MOST_SETTLED:
         return None
     lines = _describe_notation(path, look)
     for name, target in ((temperature, "temperature_degC"), (by_target["frequency_Hz"], "frequency_Hz")):
-        place = look.names.index(name)
-        cells = [row[place] for row in body if place < len(row)]
-        numbers = [n for cell in cells if (n := as_number(cell, look.decimal)) is not None]
-        lines += ["", *draft_column(name, Meaning(target), hints[name], numbers, nominal=find_nominal([*above, name]))]
+        meaning = replace(meanings[name], target=target)
+        lines += ["", *draft_column(name, meaning, hints[name], numbers[name], nominal=find_nominal([*above, name]))]
     return lines, tuple(name for name in look.names if name not in (temperature, by_target["frequency_Hz"]))
 
 
@@ -187,17 +189,16 @@ def _describe_notation(path: str, look: Look) -> list[str]:
         said = [f"# {comment_of(units)}: {named.rows} rows{about}"]
         return [*lines, *([f"group = {spell_value(named.name)}"] if named.name else []), *said]
     if look.kind == "text":
+        notation = look.notation
+        doubt = f"    # CHECK: {comment_of(notation.doubt)}" if notation.doubt else ""
+        lines += [f"separator = {spell_value(look.separator)}", f'decimal = "{notation.decimal}"{doubt}']
+        lines += [f'encoding = "{look.encoding}"']
+        lines += [f'thousands = "{notation.thousands}"'] if notation.thousands else []
+    elif look.others:
         lines += [
-            f"separator = {spell_value(look.separator)}",
-            f'decimal = "{look.decimal}"',
-            f'encoding = "{look.encoding}"',
+            f"# CHECK: the others need a [[file]] each, with sheet = one of {', '.join(map(spell_value, look.others))}",
+            f"sheet = {spell_value(look.sheet)}",
         ]
-        signs = (parting(cell, look.decimal) for row in look.rows[look.data :] for cell in row)
-        lines += [f'thousands = "{sign}"' for sign in itertools.islice(filter(None, signs), 1)]
-    elif others := list_sheets(path)[1:]:
-        lines.append(
-            f"# CHECK: this is the first sheet; the others need a [[file]] each, with sheet = one of {', '.join(map(spell_value, others))}"
-        )
     header = 0 if look.header is None else look.header + 1
     end = [f"last_line = {look.last}    # CHECK: below it stands no reading"] if look.last else []
     return [*lines, f"header_line = {header}", f"data_line = {look.data + 1}", *end]
@@ -208,29 +209,12 @@ def _lines_above(look: Look) -> list[str]:
 
 
 def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
-    names = look.names
-    above = _lines_above(look)
-    body = [row for row in look.rows[look.data :] if any(cell.strip() for cell in row)]
-    cells = {name: [row[k].strip() if k < len(row) else "" for row in body] for k, name in enumerate(names)}
-    hints = {name: f"{name} {unit}".strip() for name, unit in zip(names, look.units, strict=True)}
-    numbers = {name: [n for c in cells[name] if (n := as_number(c, look.decimal)) is not None] for name in names}
+    names, above, cells, hints, numbers = look.names, _lines_above(look), look.columns, look.hints, look.numbers
     period = find_period([*above, *names])
     own = look.group.clock if look.group is not None else None
-    known = (
-        ([], "", "")
-        if own is not None
-        else find_time(
-            names,
-            {name: [cell for cell in own if cell != name] for name, own in cells.items()},  # the head may come again
-            hints,
-            numbers,
-            look.decimal,
-            evenly=period is not None,
-        )
-    )
-    time, form, unsure = known
+    time, form, unsure = ([], "", "") if own is not None else find_time(look, evenly=period is not None)
     lines = _describe_notation(path, look)
-    markers = find_markers(names, cells, time, look.decimal)
+    markers = find_markers(look, time)
     if markers:
         lines.append(f"missing = {spell_value(markers)}    # CHECK: these cells mean 'no value'")
     if time:
@@ -241,10 +225,13 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
     else:
         stated = "the lines above the table say so" if period else unsure
         lines.append(f"sample_period_s = {period or 0.0!r}    # CHECK: {stated}")
+    joined = [" ".join(stamp) for stamp in zip(*(cells[name] for name in time), strict=True)]
     stamped = time and form not in NUMERIC_TIMES and "%z" not in form
     if stamped or (own is not None and own.start is not None and own.start.tzinfo is None):
-        lines.append('# timezone = "Europe/Berlin"    # of local times that change between summer and winter')
-    joined = [" ".join(stamp) for stamp in zip(*(cells[name] for name in time), strict=True)]
+        times = parse_stamps([stamp for stamp in joined if stamp.strip()], form) if stamped else []
+        change = find_change(times[0], np.array([(t - times[0]).total_seconds() for t in times])) if times else None
+        zone, doubt = (change[0], f"; CHECK: {change[1]}") if change else ("Europe/Berlin", "")
+        lines.append(f'# timezone = "{zone}"    # of local times that change between summer and winter{doubt}')
     if len(set(joined)) < len(joined):
         several = next((name for name in names if name not in time and _tells_devices(name, joined, cells[name])), None)
         if several is not None:
@@ -267,11 +254,13 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
     lines.append("# clock_offset_s = 0.0    # added to this file's times: positive when its clock is behind")
     usable = {name: hints[name] for name in names if name not in time and numbers[name]}
     group = look.group.name if look.group is not None else ""
-    meanings = find_meanings(usable, taken, group) if look.header is not None else guess_meanings(usable, numbers)
+    meanings = (
+        find_meanings(usable, numbers, taken, group) if look.header is not None else guess_meanings(usable, numbers)
+    )
     others = [name for name in names if name not in time and name not in meanings and any(cells[name])]
     for name in names:
         if name in others:
-            lines += ["", *draft_unknown(name, numbers[name])]
+            lines += ["", *draft_unknown(name, numbers[name], hints[name])]
         elif name in meanings:
             guessed = "    # CHECK: guessed from its values" if look.header is None else ""
             nominal = find_nominal([*above, name])
@@ -285,7 +274,7 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
 def _tells_devices(name: str, times: Sequence[str], cells: Sequence[str]) -> bool:
     """Tell whether a column of a few words makes repeated times single: those of one gyro, or channel, each; a counter within a second is none."""
     few = 1 < len(set(cells)) <= MOST_DEVICES and len(times) > 2 * len(set(cells))
-    named = re.search(DEVICE_WORDS, name.lower()) or not all(as_number(cell, ".") is not None for cell in cells)
+    named = re.search(DEVICE_WORDS, name.lower()) or not all(is_number(cell) for cell in cells)
     return bool(few and named) and len(set(zip(times, cells, strict=True))) == len(times)
 
 

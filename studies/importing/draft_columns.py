@@ -4,8 +4,9 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from studies.importing.look import as_number
-from studies.importing.meaning import BRACKETED, Meaning, read_unit
+from studies.importing.look import Look
+from studies.importing.meaning import BRACKETED, Meaning, read_unit, say_qualified
+from studies.importing.notation import Notation, is_number
 from studies.importing.units import split_nominal, units_of
 from studies.schema.keys import spell_value
 
@@ -33,8 +34,7 @@ def draft_column(
     unit = stated or next(iter(units))
     remark = remark or ("" if stated else "    # CHECK: the name states no unit")
     middle = sorted(numbers)[len(numbers) // 2]
-    doubt = f"    # CHECK: by its name {meaning.rather}, which another column fills" if meaning.rather else ""
-    doubt = f"    # CHECK: or {meaning.perhaps}, if it is the applied rate" if meaning.perhaps else doubt
+    doubt = f"    # CHECK: {comment_of(meaning.doubt)}" if meaning.doubt else ""
     lines = [f"from = {spell_value(name)}", f'to = "{target}"{doubt}']
     if target.endswith("_degC") and unit == "degC" and 200 < middle < 500:
         unit, remark = "K", "    # CHECK: the values look like kelvin"
@@ -47,6 +47,9 @@ def draft_column(
             "scale = 1.0     # CHECK: the values look like raw counts; reading × scale + offset is the temperature",
             "offset = 0.0    # CHECK",
         ]
+    if meaning.base and not units[unit].settings:
+        offset = meaning.base / float(units[unit].convert(1.0))
+        lines.append(f"offset = {offset!r}    # CHECK: the name takes it off")
     for key in units[unit].settings:
         nominal = next((f for one in re.findall(BRACKETED, hint) if (f := split_nominal(one)[1])), nominal)
         stated_here = key == "nominal_Hz" and nominal is not None
@@ -57,11 +60,13 @@ def draft_column(
     return ["[[file.column]]", *lines]
 
 
-def draft_unknown(name: str, numbers: Sequence[float]) -> list[str]:
+def draft_unknown(name: str, numbers: Sequence[float], hint: str) -> list[str]:
     """Leave a form to fill for a column without a meaning."""
+    qualified = say_qualified(hint)
     span = f"{min(numbers):.6g} to {max(numbers):.6g}; " if numbers else ""
     return [
         f"# unknown column: {spell_value(name)}",
+        *([f"# CHECK: {comment_of(qualified)}, so nothing was made of it"] if qualified else []),
         f"# {span}if it belongs to the record:",
         "# [[file.column]]",
         f"# from = {spell_value(name)}",
@@ -79,20 +84,20 @@ _SETTING_WORDS = {
 }
 
 
-def find_markers(names: Sequence[str], cells: Mapping[str, list[str]], time: Sequence[str], decimal: str) -> list[str]:
+def find_markers(look: Look, time: Sequence[str]) -> list[str]:
     """Return texts that stand in columns of numbers; of the time its own name alone, where the head is written again."""
     markers: list[str] = []
-    for name in names:
-        words = [cell for cell in cells[name] if cell and as_number(cell, decimal) is None]
-        words = [name] * words.count(name) if name in time else [*words, *_sentinels(cells[name], decimal)]
-        if 0 < 2 * len(words) < len(cells[name]):
+    for name, cells in look.columns.items():
+        words = [cell for cell in cells if cell and not is_number(cell)]
+        words = [name] * words.count(name) if name in time else [*words, *_sentinels(cells, look.notation)]
+        if 0 < 2 * len(words) < len(cells):
             markers += [word for word in dict.fromkeys(words) if word not in markers]
     return markers[:20]
 
 
-def _sentinels(cells: Sequence[str], decimal: str) -> list[str]:
+def _sentinels(cells: Sequence[str], notation: Notation) -> list[str]:
     """Return cells such as -999 or 9999 in a column whose other readings do not come near."""
-    numbers = [(cell, abs(number)) for cell in cells if (number := as_number(cell, decimal)) is not None]
+    numbers = [(cell, abs(number)) for cell in cells if (number := notation.number(cell)) is not None]
     usual = max((size for _, size in numbers if size not in SENTINELS), default=math.inf)
     return [cell for cell, size in numbers if size in SENTINELS and size > 2 * usual]
 

@@ -3,17 +3,25 @@
 import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import cast
 
 from studies.errors import InputError
 from studies.importing.channels import Group, is_container, open_channels, sort_groups
+from studies.importing.meaning import looks_likely
+from studies.importing.notation import Notation, find_notation, is_number, unit_of
 from studies.importing.raw import decode, name_columns, read_filled, split_line
-from studies.importing.sheets import EXCEL, list_sheets, read_sheet
+from studies.importing.sheets import EXCEL, read_sheets
 
 SEEN = 2000  # lines that are looked at
 HEAD = 1 << 24  # bytes
 FOOT = 50  # last lines
+STAMP = re.compile(
+    r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d{1,2}:\d{2}|\d{1,2}h\d{1,2}(m|$)|\d{1,2}[- .]+[a-z]{3}[- .]+\d{2,4}\b|\d{8}T\d{4}"
+    r"|(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-3])([0-5]\d){2}(\.\d+)?$",
+    re.IGNORECASE,
+)
 
 
 @dataclass(frozen=True)
@@ -25,10 +33,12 @@ class Look:
     rows: list[list[str]]
     header: int | None
     data: int
-    decimal: str
     kind: str
+    notation: Notation = field(default_factory=Notation)
     group: Group | None = None
     last: int | None = None  # line of the data, where others stand below it
+    sheet: str = ""
+    others: tuple[str, ...] = ()  # further sheets
 
     @property
     def names(self) -> list[str]:
@@ -36,58 +46,84 @@ class Look:
         return name_columns([""] * len(self.rows[self.data]) if self.header is None else self.rows[self.header])
 
     @property
-    def units(self) -> list[str]:
-        """The cells of the line of units below the names, empty where there is none."""
-        if self.header is None or self.data == self.header + 1:
-            return [""] * len(self.names)
-        units = self.rows[self.header + 1]
-        return [*units, *[""] * len(self.names)][: len(self.names)]
+    def body(self) -> list[list[str]]:
+        """The rows of the table that hold something."""
+        return [row for row in self.rows[self.data :] if any(cell.strip() for cell in row)]
+
+    @property
+    def columns(self) -> dict[str, list[str]]:
+        """The cells of every column."""
+        body = self.body
+        return {name: [row[k].strip() if k < len(row) else "" for row in body] for k, name in enumerate(self.names)}
+
+    @property
+    def numbers(self) -> dict[str, list[float]]:
+        """The numbers of every column."""
+        read = self.notation.number
+        return {name: [n for cell in cells if (n := read(cell)) is not None] for name, cells in self.columns.items()}
+
+    @property
+    def hints(self) -> dict[str, str]:
+        """Name and unit of every column: of the line of units below the names, else what all its numbers have behind them."""
+        below = self.header is not None and self.data > self.header + 1
+        units = self.rows[self.header + 1] if below and self.header is not None else []
+        units = [*units, *[""] * len(self.names)]
+        found = {}
+        for (name, cells), unit in zip(self.columns.items(), units, strict=False):
+            behind = {unit_of(cell) for cell in cells if is_number(cell)}
+            stated = unit or (f"[{behind.pop()}]" if len(behind) == 1 and "" not in behind else "")
+            found[name] = f"{name} {stated}".strip()
+        return found
 
 
 def look_at(path: str) -> Look:
-    """Find encoding, separator, decimal sign, header and first row of a raw file."""
+    """Find encoding, separator, header, first row and notation of a raw file; of a workbook, on the sheet with most numbers."""
     if is_container(path):
         with open_channels(path) as channels:
             return look_at_group(sort_groups(channels)[0])
-    excel = Path(path).suffix.lower() in EXCEL
-    if excel:
-        whole, encoding, separator = read_sheet(path, None), "utf-8", ","
-        rows, end, total = whole[:SEEN], whole[-FOOT:], len(whole)
+    if Path(path).suffix.lower() in EXCEL:
+        looks = {name: _find_table(rows[:SEEN], rows[-FOOT:], len(rows), "excel") for name, rows in read_sheets(path)}
+        if any(looks.values()):
+            most = max(looks, key=lambda name: sum(map(len, look.numbers.values())) if (look := looks[name]) else -1)
+            return replace(cast(Look, looks[most]), sheet=most, others=tuple(name for name in looks if name != most))
+        where, mend = f" on any of its sheets {', '.join(looks)}", 'write the map by hand, with sheet = "…"'
     else:
         data = read_filled(path, HEAD)
         encoding = _find_encoding(path, data)
         lines = decode(path, data, encoding).split("\n")
         separator = _find_separator(lines[:SEEN])
         rows, end = ([_split(line, separator) for line in part] for part in (lines[:SEEN], lines[-FOOT:]))
-        total = len(lines) if len(data) < HEAD else 0
+        if found := _find_table(rows, end, len(lines) if len(data) < HEAD else 0, "text"):
+            hints = found.hints
+            notation = find_notation(found.columns, lambda name, numbers: looks_likely(hints[name], numbers))
+            return replace(found, encoding=encoding, separator=separator, notation=notation)
+        where, mend = "", "write the map by hand"
+    raise InputError(f"{path}: no table with rows of two numbers or more was found{where}; {mend}.")
+
+
+def _find_table(rows: list[list[str]], end: Sequence[Sequence[str]], total: int, kind: str) -> Look | None:
+    """Find the table among the first rows of a file, and where it ends among its last; None where there is none."""
     filled = max((k + 1 for row in rows for k, cell in enumerate(row) if cell.strip()), default=0)
     rows = [row[:filled] for row in rows]  # a spreadsheet writes separators of empty columns behind the last one
-    decimal = "," if not excel and _has_decimal_commas(rows, separator) else "."
-    numeric = [sum(_is_reading(cell, decimal) for cell in row) for row in rows]
+    numeric = [sum(map(_is_reading, row)) for row in rows]
     width = max(
         (len(row) for row, count in zip(rows, numeric, strict=True) if 2 * count >= len(row) and count), default=0
     )
     first = next((k for k, count in enumerate(numeric) if count and 2 * count >= width), None)
-    header = None
-    if first is not None:
-        named = [k for k in range(first) if sum(bool(cell.strip()) for cell in rows[k]) >= max(1, width - 1)]
-        # of two lines with a cell for every column the second one holds the units
-        header = named[-2] if len(named) > 1 and _is_unit_line(rows[named[-1]]) else named[-1] if named else None
     if first is None or width < 2:
-        where, mend = "", "write the map by hand"
-        if excel:
-            where, mend = f" on the first of its sheets {', '.join(list_sheets(path))}", f'{mend}, with sheet = "…"'
-        raise InputError(f"{path}: no table with rows of two numbers or more was found{where}; {mend}.")
-    last = _last_line(rows[first], end, total, decimal)
-    kind = "excel" if excel else "text"
-    return Look(encoding, separator, rows[:last], header, first, decimal, kind, last=last)
+        return None
+    named = [k for k in range(first) if sum(bool(cell.strip()) for cell in rows[k]) >= max(1, width - 1)]
+    # of two lines with a cell for every column the second one holds the units
+    header = named[-2] if len(named) > 1 and _is_unit_line(rows[named[-1]]) else named[-1] if named else None
+    last = _last_line(rows[first], end, total)
+    return Look("utf-8", ",", rows[:last], header, first, kind, last=last)
 
 
-def _last_line(first: Sequence[str], end: Sequence[Sequence[str]], total: int, decimal: str) -> int | None:
+def _last_line(first: Sequence[str], end: Sequence[Sequence[str]], total: int) -> int | None:
     """Return the line after which a file has words where its first row has a reading; None where it ends with readings."""
-    place = next(k for k, cell in enumerate(first) if _is_reading(cell, decimal))
+    place = next(k for k, cell in enumerate(first) if _is_reading(cell))
     below = [row[place].strip() if place < len(row) else "" for row in end]
-    kept = max((k + 1 for k, cell in enumerate(below) if _is_reading(cell, decimal)), default=0)
+    kept = max((k + 1 for k, cell in enumerate(below) if _is_reading(cell)), default=0)
     return total - len(end) + kept if total and kept and any(below[kept:]) else None
 
 
@@ -96,7 +132,7 @@ def look_at_group(group: Group) -> Look:
     columns = [channel.read(0, min(SEEN, channel.rows)).tolist() for channel in group.channels.values()]
     rows = [["" if x != x else repr(x) for x in row] for row in zip(*columns, strict=True)]
     units = [f"[{channel.unit}]" if channel.unit else "" for channel in group.channels.values()]
-    return Look("", "", [list(group.channels), units, *rows], 0, 2, ".", "channels", group)
+    return Look("", "", [list(group.channels), units, *rows], 0, 2, "channels", group=group)
 
 
 def _is_unit_line(row: Sequence[str]) -> bool:
@@ -137,34 +173,13 @@ def _split(line: str, separator: str) -> list[str]:
         return [line]
 
 
-def _has_decimal_commas(rows: Sequence[Sequence[str]], separator: str) -> bool:
-    """Tell whether commas are decimal ones; between commas (in quotes) only what parts no thousands is."""
-    decimal = r"[+-]?\d+(\.\d{3})*,\d+([eE][+-]?\d+)?"
-    found = [cell.strip() for row in rows for cell in row if re.fullmatch(decimal, cell.strip())]
-    return (
-        any(not re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", cell) for cell in found) if separator == "," else bool(found)
-    )
-
-
-def parting(cell: str, decimal: str) -> str:
-    """Return the sign between the thousands of a number such as 4.432,07, or ""."""
-    found = re.fullmatch(rf"[+-]?\d{{1,3}}([.,])\d{{3}}(\1\d{{3}})*\{decimal}\d+", cell.strip())
-    return found[1] if found and found[1] != decimal else ""
-
-
-def as_number(cell: str, decimal: str) -> float | None:
-    """Return the number that a cell holds, None where it holds something else."""
-    text = cell.strip().replace(parting(cell, decimal), "").replace(decimal, ".")
-    return float(text) if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?", text) else None
-
-
-def _is_reading(cell: str, decimal: str) -> bool:
-    return as_number(cell, decimal) is not None or is_stamp(cell)
+def _is_reading(cell: str) -> bool:
+    return is_number(cell) or is_stamp(cell)
 
 
 def is_stamp(cell: str) -> bool:
     """Tell whether a cell looks like a date or a time of day."""
-    return bool(re.match(r"\s*(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d{1,2}:\d{2})", cell))
+    return STAMP.match(cell.strip()) is not None
 
 
 HZ = {"": 1.0, "k": 1e3, "m": 1e6}

@@ -1,31 +1,38 @@
 """Raw tables: text of any separator and encoding, or Excel sheets, as cells of text with the lines that they stand on."""
 
 import codecs
+import contextlib
 import csv
+import gzip
 import io
 import itertools
 import re
 import warnings
+import zlib
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO, cast
 
+import msgspec
 import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError, numbered
 from studies.files.given import shorten
 from studies.files.numbers import ROWS_AT_ONCE, parse_portions
-from studies.files.reading import ANY_SIZE, PORTION, digest, opened, read_bytes
+from studies.files.reading import ANY_SIZE, PORTION, digest, opened
 from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
-from studies.importing.sheets import EXCEL, read_sheet
+from studies.importing.notation import find_second, read_number
+from studies.importing.sheets import EXCEL, read_sheets
 from studies.importing.tables import ParsedTable, Part, RawTable, check_column
+from studies.importing.units import find_spelling
 
 if TYPE_CHECKING:
     import pandas as pd
 
 OVERFLOW = "(beyond the header)"
+PACKED = ".gz"
 
 
 class NotPlain(Exception):
@@ -37,8 +44,7 @@ class TextTable(RawTable):
     """Rows of a table whose cells are all text."""
 
     cells: "pd.DataFrame"
-    decimal: str
-    thousands: str = ""
+    file: FileMap
 
     def joined(self, columns: Sequence[str]) -> "pd.Series[str]":
         """Return several columns joined by a blank, such as a date and a time of day; nothing where one is marked as missing."""
@@ -59,18 +65,29 @@ class TextTable(RawTable):
         """Return a column as numbers, NaN where a cell is empty; anything else is an error that names the line."""
         import pandas as pd
 
-        text = self.text(column)
+        text, decimal, thousands = self.text(column), self.file.decimal, self.file.thousands
         empty = np.asarray(text.isin(["", *self.missing]))
-        plain = text.str.replace(self.thousands, "", regex=False) if self.thousands else text
-        plain = plain.str.replace(self.decimal, ".", regex=False) if self.decimal != "." else plain
+        plain = text.str.replace(",", ".", regex=False) if decimal == "," else text
+        if decimal == "," or thousands:  # a point may part thousands
+            plain = plain.mask(text.str.contains(f"[.{thousands}]" if decimal == "," else f"[{thousands}]"))
         values = pd.to_numeric(plain.mask(empty, "nan"), errors="coerce").to_numpy(dtype=float, copy=True)
-        bad = np.flatnonzero(np.isnan(values) & ~empty)
-        if len(bad):
-            raise InputError(
-                f"{self.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{column}' is not a"
-                f" number (decimal = '{self.decimal}', thousands = '{self.thousands}'); where it marks a missing value, add it to 'missing' in the map; lines below the table are left out with last_line."
-            )
+        careful = np.flatnonzero(np.isnan(values) & ~empty).tolist()
+        for row, cell in zip(careful, text.to_numpy()[careful], strict=True):
+            found = read_number(cell, decimal, thousands)
+            if found is None or not self._is_stated(column, found[1]):
+                raise InputError(
+                    f"{self.place(row)}: '{shorten(cell)}' in column '{column}' is not a"
+                    f" number in the unit of the map (decimal = '{decimal}', thousands = '{thousands}'); where it marks a missing value, add it to 'missing' in the map; lines below the table are left out with last_line."
+                )
+            values[row] = found[0]
         return values
+
+    def _is_stated(self, column: str, unit: str) -> bool:
+        """Tell whether what stands behind a number is the unit that the map states."""
+        if not unit or (column in self.file.time and find_second(unit) == self.file.time_format):
+            return True
+        units = [(one.target, one.unit) for one in self.file.columns if one.source == column]
+        return bool(units) and all(find_spelling(target, unit) == stated for target, stated in units)
 
 
 def read_text(paths: Sequence[str | Path], file: FileMap, plain: bool = True) -> Generator[RawTable]:
@@ -87,7 +104,11 @@ def read_text(paths: Sequence[str | Path], file: FileMap, plain: bool = True) ->
 def read_plain(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTable]]:
     """Yield the columns' names and the next rows of a text of plain numbers; NotPlain where cells must be looked at as text."""
     simple = file.encoding == "utf-8" and file.separator != "space" and file.last_line is None and not file.thousands
-    if not simple or Path(path).suffix.lower() in EXCEL or (file.time and file.time_format not in NUMERIC_TIMES):
+    if (
+        not simple
+        or Path(path).suffix.lower() in (*EXCEL, PACKED)
+        or (file.time and file.time_format not in NUMERIC_TIMES)
+    ):
         raise NotPlain
     with opened(path, ANY_SIZE) as raw:
         head = list(itertools.islice(raw, file.data_line))
@@ -111,7 +132,7 @@ def read_raw(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTa
 
     part = Part(str(path), digest(path, ANY_SIZE), file.data_line)
     if Path(path).suffix.lower() in EXCEL:
-        lines = read_sheet(path, file.sheet or None)
+        _, lines = next(read_sheets(path, file.sheet))
         names, rows = _head(path, lines, file), lines[file.data_line - 1 : file.last_line]
         if not rows:
             raise _no_rows(path, file)
@@ -120,9 +141,9 @@ def read_raw(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTa
             raise InputError(f"{path}: some rows of the sheet are longer than its header (line {file.header_line}).")
         filled = [(row + [""] * width)[:width] for row in rows]
         cells = pd.DataFrame(filled, columns=[*names, OVERFLOW], dtype=str)
-        yield names, TextTable(part, file.missing, 0, len(cells), cells, ".")
+        yield names, TextTable(part, file.missing, 0, len(cells), cells, msgspec.structs.replace(file, decimal="."))
         return
-    with opened(path, ANY_SIZE) as raw:
+    with unpacked(path) as raw:
         if not raw.read(PORTION).strip():
             raise InputError(f"{path}: the file is empty.")
         raw.seek(0)
@@ -130,14 +151,27 @@ def read_raw(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTa
         try:
             body = _Body(path, text, list(itertools.islice(text, file.data_line)), file)
             lines = _split_lines(path, body.head, file)
-            names, signs = _head(path, lines, file), (file.decimal, file.thousands)
+            names = _head(path, lines, file)
             # a spreadsheet writes separators of empty columns behind the last one
             if file.header_line and file.separator != "space" and not lines[-1][-1].strip():
                 body.padding = re.compile(f"{re.escape(SEPARATORS[file.separator])}+$", re.MULTILINE)
             for cells in _parse_text(path, body, file, names):
-                yield names, TextTable(part, file.missing, int(cells.index[0]), len(cells), cells, *signs)
+                yield names, TextTable(part, file.missing, int(cells.index[0]), len(cells), cells, file)
         except UnicodeError:
             raise _wrong_encoding(path, file.encoding) from None
+
+
+@contextlib.contextmanager
+def unpacked(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a raw file for reading, through gzip where its name ends so."""
+    with opened(path, ANY_SIZE) as raw:
+        if Path(path).suffix.lower() != PACKED:
+            yield raw
+            return
+        try:
+            yield cast(BinaryIO, gzip.GzipFile(fileobj=raw))
+        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+            raise InputError(f"{path}: cannot be unpacked by gzip ({shorten(str(error))}); pack it again.") from None
 
 
 def _no_rows(path: str | Path, file: FileMap) -> InputError:
@@ -147,7 +181,7 @@ def _no_rows(path: str | Path, file: FileMap) -> InputError:
 def _wrong_encoding(path: str | Path, encoding: str) -> InputError:
     """Return what is wrong with a text that is not of this encoding, with the line where lines can be told."""
     if encoding == "utf-8":
-        with opened(path, ANY_SIZE) as raw:
+        with unpacked(path) as raw:
             for number, line in enumerate(raw, 1):
                 try:
                     line.decode()
@@ -159,13 +193,16 @@ def _wrong_encoding(path: str | Path, encoding: str) -> InputError:
 
 def _checked(path: str | Path, part: str) -> str:
     if "\0" in part:
-        raise InputError(f"{path}: not a text table (it holds zero bytes); is it UTF-16 or a binary file?")
+        raise InputError(
+            f"{path}: not a text table (it holds zero bytes); is it UTF-16, packed (unpack it) or a binary file?"
+        )
     return part
 
 
 def read_filled(path: str | Path, most: int) -> bytes:
     """Read a file that must exist and hold something, or its first lines."""
-    data = read_bytes(path, ANY_SIZE, most)
+    with unpacked(path) as raw:
+        data = raw.read(most)
     if not data.strip():
         raise InputError(f"{path}: the file is empty.")
     return data if len(data) < most else data[: data.rfind(b"\n") + 1]

@@ -1,6 +1,7 @@
 """Excel sheets as rows of text."""
 
 import importlib
+from collections.abc import Iterator
 from pathlib import Path
 
 from studies.errors import InputError, MissingEnvironment, nearest
@@ -10,8 +11,8 @@ EXCEL = (".xlsx", ".xlsm")
 MOST_CELLS = 20_000_000
 
 
-def read_sheet(path: str | Path, sheet: str | None) -> list[list[str]]:
-    """Return the rows of an Excel sheet as text: dates in ISO 8601, numbers with all their digits."""
+def read_sheets(path: str | Path, sheet: str = "") -> Iterator[tuple[str, list[list[str]]]]:
+    """Yield name and rows of the sheets of a workbook, or of one of them, as text: dates in ISO 8601, numbers with all their digits."""
     try:
         openpyxl = importlib.import_module("openpyxl")
     except ImportError:
@@ -20,25 +21,19 @@ def read_sheet(path: str | Path, sheet: str | None) -> list[list[str]]:
         ) from None
     try:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        if sheet is not None and sheet not in book.sheetnames:
+        if sheet and sheet not in book.sheetnames:
             raise InputError(f"{path}: there is no sheet '{sheet}'{nearest(sheet, book.sheetnames)}")
-        page = book[sheet] if sheet is not None else book.worksheets[0]
-        cells = (page.max_row or 0) * (page.max_column or 0)
-        if cells > MOST_CELLS:
-            raise InputError(
-                f"{path}: its sheet extends to row {page.max_row}, column {page.max_column}, more than the limit of {MOST_CELLS:,}"
-                " cells. Delete cells far from the table, or export the sheet as CSV."
-            )
-        return [[_cell_text(value) for value in row] for row in page.iter_rows(values_only=True)]
+        for page in [book[sheet]] if sheet else book.worksheets:
+            if (page.max_row or 0) * (page.max_column or 0) > MOST_CELLS:
+                raise InputError(
+                    f"{path}: its sheet '{page.title}' extends to row {page.max_row}, column {page.max_column}, more than the limit of {MOST_CELLS:,}"
+                    " cells. Delete cells far from the table, or export the sheet as CSV."
+                )
+            yield page.title, [[_cell_text(value) for value in row] for row in page.iter_rows(values_only=True)]
     except InputError:
         raise
     except Exception as error:  # openpyxl lets errors of zip, XML and its own through, also while it reads
         raise InputError(f"{path}: not an Excel workbook that can be read ({shorten(str(error))}).") from None
-
-
-def list_sheets(path: str | Path) -> list[str]:
-    """Return the names of the sheets of a workbook that can be read."""
-    return list(importlib.import_module("openpyxl").load_workbook(path, read_only=True).sheetnames)
 
 
 def _cell_text(value: object) -> str:

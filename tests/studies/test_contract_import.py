@@ -334,14 +334,22 @@ def test_excel_without_openpyxl_says_how_to_get_it(tmp_path, monkeypatch, capsys
     assert "Traceback" not in capsys.readouterr().err
 
 
-def test_a_workbook_that_begins_with_a_cover_names_its_sheets(tmp_path):
+def test_a_workbook_that_begins_with_a_cover_is_read_on_the_sheet_of_its_table(tmp_path):
     openpyxl = pytest.importorskip("openpyxl", reason="the optional extra 'excel' is not installed")
     book = openpyxl.Workbook()
     book.active.title = "Info"
-    book.active.append(["made by", "the chamber"])
-    book.create_sheet("Daten").append([1.0, 2.0, 3.0])
+    book.active.append(["serial", 17])
+    for row in (["time_s", "frequency [Hz]", "T [°C]"], *([10 * k, 4400 + k / 8, 20.5 + k] for k in range(20))):
+        (book["Daten"] if len(book.sheetnames) > 1 else book.create_sheet("Daten")).append(row)
     book.save(tmp_path / "raw.xlsx")
-    with pytest.raises(InputError, match='first of its sheets Info, Daten; write the map by hand, with sheet = "…"'):
+    record = draft_and_import(tmp_path / "raw.xlsx", tmp_path)
+    assert record["frequency_Hz"].tolist() == [4400 + k / 8 for k in range(20)]
+    assert '# CHECK: the others need a [[file]] each, with sheet = one of "Info"' in (tmp_path / "map.toml").read_text()
+    book["Info"].delete_rows(1)
+    book.remove(book["Daten"])
+    book.create_sheet("Notes")
+    book.save(tmp_path / "raw.xlsx")
+    with pytest.raises(InputError, match='any of its sheets Info, Notes; write the map by hand, with sheet = "…"'):
         draft_map([str(tmp_path / "raw.xlsx")])
 
 
@@ -931,3 +939,215 @@ def test_lines_below_the_table_of_one_of_several_files_end_no_other(tmp_path):
         lines = [f"{begin + k};{4432 + k % 7};{20 + k % 5}" for k in range(300)]
         (tmp_path / name).write_text("\n".join(["time_s;frequency_Hz;T (C)", *lines, below]))
     assert "last_line" not in draft_map([str(tmp_path / name) for name in ("a.csv", "b.csv")]).text
+
+
+def planted(folder, head, cells):
+    """A table of `;` and 40 rows of text, and what its draft says behind CHECK."""
+    path = table(folder, head, (";".join(cells(k)) for k in range(40)))
+    record = draft_and_import(path, folder)
+    said = [line.partition("CHECK: ")[2] for line in (folder / "map.toml").read_text().splitlines()]
+    return record, [line for line in said if line]
+
+
+def german(value, digits):
+    return f"{value:,.{digits}f}".translate(str.maketrans(",.", ".,"))
+
+
+@pytest.mark.parametrize(
+    ("frequency", "temperature", "step", "said"),
+    [
+        (lambda f: german(f, 3), lambda T: german(T, 1), 0.125, None),  # 4.400,125 shows both signs
+        (lambda f: german(f, 0), lambda T: german(T, 1), 1, "'4.400' is read as 4400, not as 4.4"),
+        (lambda f: german(f, 0), lambda T: f"{T:.0f}", 1, "'4.400' is read as 4400, not as 4.4"),  # no comma at all
+        (lambda f: f"{f:,.0f}", lambda T: f"{T:.1f}", 1, "'4,400' is read as 4400, not as 4.4"),
+        (lambda f: f"{f:,.0f}", lambda T: f"{T:.0f}", 1, "'4,400' is read as 4400, not as 4.4"),
+        (lambda f: f"{f:,.3f}".replace(",", "\u202f"), lambda T: f"{T:.0f}", 0.125, None),  # a narrow blank
+        (lambda f: f"{f:.3f}", lambda T: f"{T:.3f}", 0.125, None),  # 20.000 beside 4400.125
+    ],
+)
+def test_planted_signs_of_numbers_are_told_by_all_cells(tmp_path, frequency, temperature, step, said):
+    """4.400 was read as 4.4 Hz, without a word."""
+    record, checks = planted(
+        tmp_path,
+        "t [s];freq [Hz];temp [°C]",
+        lambda k: (str(10 * k), frequency(4400 + step * k), temperature(20.0 + k)),
+    )
+    assert [check for check in checks if "is read as" in check] == ([said] if said else [])
+    assert record["frequency_Hz"].tolist() == [4400 + step * k for k in range(40)]
+    assert record["housing_temperature_degC"].tolist() == [20.0 + k for k in range(40)]
+
+
+def test_planted_times_beyond_a_thousand_seconds(tmp_path):
+    """990, 1.000, 1.010 rise as thousands only; three decimals that could be thousands, and nothing else, are asked for."""
+    head = "t [s];freq [Hz]"
+    record, checks = planted(tmp_path, head, lambda k: (german(10.0 * k + 800, 0), german(4400 + k / 10, 1)))
+    assert record["time_s"].tolist() == [10.0 * k for k in range(40)]
+    assert not checks
+    record, checks = planted(tmp_path, "t [s];bias", lambda k: (str(10 * k), f"{1 + k / 1e3:.3f}"))
+    assert record["bias_deg_per_h"][2] == 1.002
+    assert "'1.000' is read as 1; if '.' parts thousands, write decimal = ',', thousands = '.'" in checks
+
+
+@pytest.mark.parametrize(
+    ("signs", "cell", "read"),
+    [
+        ('decimal = ","\nthousands = "."', "4.400,5", 4400.5),
+        ('decimal = ","\nthousands = "."', "4.400", 4400.0),
+        ('decimal = ","\nthousands = "."', "20.5", None),  # was 205
+        ('decimal = ","', "20.5", 20.5),
+        ('decimal = ","', "4.400", None),  # was 4.4
+        ('decimal = ","', "4400,5 Hz", 4400.5),
+        ("", "4.4e3Hz", 4400.0),
+        ("", "4.4 kHz", None),
+        ("", "\u22124400.5", -4400.5),
+    ],
+)
+def test_a_cell_that_the_map_does_not_describe_is_refused_by_its_line(tmp_path, signs, cell, read):
+    sign = "sign = -1\n" if read and read < 0 else ""
+    column = f'{sign}to = "frequency_Hz"\nunit = "Hz"'
+    rows = [f"{k};{cell}" for k in range(3)]
+    extra = f'separator = ";"\ntime_format = "s"\n{signs}'
+    if read is None:
+        with pytest.raises(InputError, match=r"line 2: '.*' in column 'x' is not a number in the unit of the map"):
+            simple(tmp_path, rows, extra, column, "t;x")
+    else:
+        assert simple(tmp_path, rows, extra, column, "t;x")["frequency_Hz"].tolist() == [abs(read)] * 3
+
+
+@pytest.mark.parametrize(
+    ("names", "expected", "said"),
+    [
+        (("f-4400",), ("frequency_Hz",), "the name takes it off"),
+        (("Frequency deviation",), (None,), "its name says 'deviation', so nothing was made of it"),
+        (("freq error",), (None,), "its name says 'error', so nothing was made of it"),
+        (("bias sd",), (None,), "its name says 'sd', so nothing was made of it"),
+        (("Sampling frequency",), (None,), "its name says 'sampling', so nothing was made of it"),
+        (("sample",), (None,), "its name says 'sample', so nothing was made of it"),
+        (("Frequenzabweichung [Hz]", "Frequenz [Hz]"), (None, "frequency_Hz"), "its name says 'abweich', so nothing was made of it"),
+        (("laser temp", "chamber temp", "resonator temperature"), (None, "chamber_temperature_degC", "housing_temperature_degC"), "its name says 'laser'"),
+        (("Temp ref", "T"), (None, "housing_temperature_degC"), "its name says 'ref'"),
+        (("Temp ref",), ("housing_temperature_degC",), "its name says 'ref'"),
+        (("T_gyro", "freq"), ("housing_temperature_degC", None), ""),  # once a rate
+        (("temp board", "T_case [°C]"), (None, "housing_temperature_degC"), "its name says 'board'"),
+        (("chamber setpoint", "chamber actual"), (None, "chamber_temperature_degC"), "its name says 'setpoint'"),
+        (("chamber pressure", "chamber"), (None, "chamber_temperature_degC"), "its name says 'pressure'"),
+        (("temp 1", "temp 2", "temp 3"), ("housing_temperature_degC", "chamber_temperature_degC", None), "or 'temp 3', which fits as well"),
+        (("frequency",), ("frequency_Hz",), "its values are unusual for that"),
+    ],
+)  # fmt: skip
+def test_planted_headings_are_taken_for_what_they_say(tmp_path, names, expected, said):
+    """Each was the wrong quantity without a word: the first candidate won, whatever else its name said."""
+    values = 20 + 5 * np.sin(np.arange(40) / 9)
+    readings = [values - 20.5 if name == "f-4400" else values for name in names]
+    rows = [",".join([f"{10 * k}", *(f"{own[k]:.4f}" for own in readings)]) for k in range(40)]
+    text = draft_map([str(table(tmp_path, ",".join(["time_s", *names]), rows))]).text
+    found = {column["from"]: column for column in tomllib.loads(text)["file"][0].get("column", [])}
+    wanted = [(name, target) for name, target in zip(names, expected, strict=True) if name != "freq"]
+    assert [(name, found.get(name, {}).get("to")) for name, _ in wanted] == wanted
+    assert any(said in line for line in text.splitlines() if "CHECK" in line)
+    if "f-4400" in found:
+        assert found["f-4400"]["offset"] == 4400.0
+
+
+def test_of_two_columns_of_one_name_the_one_with_the_values_is_taken(tmp_path):
+    rows = (f"{k},{0.1 * (k % 7):.1f},{4400 + k / 10:.1f}" for k in range(40))
+    record = draft_and_import(table(tmp_path, "time_s,freq 1 [Hz],freq 2 [Hz]", rows), tmp_path)
+    assert record["frequency_Hz"][0] == 4400
+
+
+@pytest.mark.parametrize(
+    ("begin", "step", "zone", "leap"),
+    [
+        ((2026, 3, 28, 22), 600, "Europe/Berlin", "after 2026-03-29 01:50:00 comes 03:00:00, an hour more"),
+        ((2026, 3, 28, 22), 3600, "Europe/London", "after 2026-03-29 00:00:00 comes 02:00:00, an hour more"),
+        ((2026, 3, 8, 5), 1, "America/New_York", "after 2026-03-08 01:59:59 comes 03:00:00, an hour more"),
+        ((2026, 10, 24, 22), 3600, "Europe/Berlin", "after 2026-10-25 02:00:00 comes 02:00:00, an hour less"),
+        ((2026, 10, 24, 22), 600, "Europe/Berlin", "after 2026-10-25 02:50:00 comes 02:00:00, an hour less"),
+        ((2026, 5, 1, 22), 600, "Europe/Berlin", ""),
+        ((2026, 3, 28, 22), 600, "Etc/GMT-1", ""),
+    ],
+)
+def test_planted_changes_of_clocks_are_said(tmp_path, capsys, begin, step, zone, leap):
+    """Local stamps through a night in which clocks change: the draft and the import say it, and the zone that they name mends it."""
+    start = datetime.datetime(*begin, tzinfo=datetime.UTC)
+    count = 40 if step == 3600 else 60 if step == 600 else 7210
+    moments = [(start + datetime.timedelta(seconds=step * k)).astimezone(ZoneInfo(zone)) for k in range(count)]
+    raw, out, run = (tmp_path / name for name in ("raw.csv", "map.toml", "run.csv"))
+    table(tmp_path, "time,frequency [Hz]", (f"{at:%Y-%m-%d %H:%M:%S},{4400 + k / 1e4}" for k, at in enumerate(moments)))
+    assert hrg_import(raw, "--draft", out) == 0
+    text = out.read_text()
+    if step > 1:  # the draft looks at the first rows only
+        assert ("CHECK: " + leap in text) if leap else "clocks change then" not in text
+    assert hrg_import(raw, "--map", out, "--out", run) == (2 if step == 600 and "less" in leap else 0)
+    said = capsys.readouterr()
+    assert (leap in said.out if step != 600 or "more" in leap else "give 'timezone'" in said.err) if leap else "CHECK: after" not in said.out  # fmt: skip
+    if leap:
+        out.write_text(re.sub('# timezone = ".*?"', f'timezone = "{zone}"', text))
+        assert hrg_import(raw, "--map", out, "--out", run) == 0
+        assert read_record(run)["time_s"].tolist() == [float(step * k) for k in range(count)]
+        assert "clocks change then" not in capsys.readouterr().out
+
+
+def test_a_packed_table_is_read_as_the_table(tmp_path):
+    import gzip
+
+    text = "time_s,frequency [Hz],T [°C]\n" + "".join(f"{k},{4400 + k / 8},{20 + k / 4}\n" for k in range(50))
+    (tmp_path / "raw.csv.gz").write_bytes(gzip.compress(text.encode()))
+    record = draft_and_import(tmp_path / "raw.csv.gz", tmp_path)
+    assert record["frequency_Hz"].tolist() == [4400 + k / 8 for k in range(50)]
+    (tmp_path / "raw.csv.gz").write_bytes(gzip.compress(text.encode())[:-40])
+    with pytest.raises(InputError, match=r"raw\.csv\.gz: cannot be unpacked by gzip"):
+        draft_map([str(tmp_path / "raw.csv.gz")])
+
+
+@pytest.mark.parametrize(
+    ("stamp", "form", "said"),
+    [
+        ("{:%Y-%m-%dT%H:%M:%S},5", "iso", ""),
+        ("{:%d.%m.%Y %H:%M:%S},5", "%d.%m.%Y %H:%M:%S.%f", ""),
+        ("{:%d/%m/%Y %H:%M:%S}", "%d/%m/%Y %H:%M:%S", "day and month could be exchanged; or '%m/%d/%Y %H:%M:%S'"),
+        ("{:%d-%m-%Y %I:%M:%S %p}", "%d-%m-%Y %I:%M:%S %p", "day and month could be exchanged"),
+        ("{:%d.%m.%Y %Hh%Mm%Ss}", "%d.%m.%Y %Hh%Mm%Ss", ""),
+        ("{:%Hh%Mm%Ss}", "%Hh%Mm%Ss", "no date"),
+        ("{:%d-%b-%Y %H:%M:%S}", "%d-%b-%Y %H:%M:%S", ""),
+        ("{:%Y%m%d%H%M%S}", "%Y%m%d%H%M%S", ""),  # once seconds, of 37 and 77 s
+        ("{:%Y%m%dT%H%M%S}", "iso", ""),
+    ],
+)
+def test_planted_stamps_are_read_or_asked_for(tmp_path, stamp, form, said):
+    begin = datetime.datetime(2026, 3, 1, 10)
+    record, checks = planted(
+        tmp_path,
+        "time;frequency [Hz]",
+        lambda k: (stamp.format(begin + datetime.timedelta(seconds=37 * k)), f"{4400 + k / 10}"),
+    )
+    assert record["time_s"].tolist() == [37.0 * k for k in range(40)]
+    assert f'time_format = "{form}"' in (tmp_path / "map.toml").read_text()
+    assert [said in check for check in checks] == [True] * bool(said)
+    if "%Y" in stamp:
+        assert record.start == begin + datetime.timedelta(seconds=0.5 if ",5" in stamp else 0)
+
+
+def test_days_that_pass_midnight_tell_day_from_month(tmp_path):
+    """01/03 and 02/03 lie a day apart by one order, a month by the other."""
+    begin = datetime.datetime(2026, 3, 1, 23, 50)
+    record, checks = planted(
+        tmp_path,
+        "time;frequency [Hz]",
+        lambda k: (f"{begin + datetime.timedelta(hours=2 * k):%m/%d/%Y %H:%M}", f"{4400 + k / 10}"),
+    )
+    assert record.start == begin
+    assert record["time_s"].tolist() == [7200.0 * k for k in range(40)]
+    assert not checks
+
+
+def test_units_and_a_printed_minus_in_cells_are_read(tmp_path):
+    record, checks = planted(
+        tmp_path,
+        "Zeit;Frequenz;Temperatur",
+        lambda k: (f"{2 * k} min", f"{4400 + k},5 Hz", f"\u2212{20 + k},25 °C"),
+    )
+    assert record["time_s"][3] == 360
+    assert record["frequency_Hz"][3] == 4403.5
+    assert record["housing_temperature_degC"][3] == -23.25
+    assert not checks
