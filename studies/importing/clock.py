@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 _EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
 _UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 _HALF_DAY = 43200.0
-DECIMAL_COMMA = r"(?<=\d),(?=\d)"
 _ZONE = r"(?:[Zz]|[+-]\d\d:?\d\d)$"
 LONGEST_RUN = 10 * 365.25 * 86400.0  # s
 
@@ -132,7 +131,7 @@ class Clock:
         file, name = self.file, " ".join(self.file.time)
         text = table.joined(file.time)
         empty = np.asarray(text == "")
-        plain = text if "," in self.form else text.str.replace(DECIMAL_COMMA, ".", regex=True)
+        plain = text if "," in self.form else text.str.replace(",", ".", regex=False)
         form = "ISO8601" if self.form == "iso" else self.form
         plain = plain.mask(empty)
         zoned = "%z" in form or (form == "ISO8601" and bool(plain.dropna().str.contains(_ZONE).any()))

@@ -4,6 +4,7 @@ import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import cast
 
@@ -40,7 +41,7 @@ class Look:
     sheet: str = ""
     others: tuple[str, ...] = ()  # further sheets
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
         """The columns' names, their places where a name is missing; a repeated one gets its place."""
         return name_columns([""] * len(self.rows[self.data]) if self.header is None else self.rows[self.header])
@@ -50,19 +51,19 @@ class Look:
         """The rows of the table that hold something."""
         return [row for row in self.rows[self.data :] if any(cell.strip() for cell in row)]
 
-    @property
+    @cached_property
     def columns(self) -> dict[str, list[str]]:
         """The cells of every column."""
         body = self.body
         return {name: [row[k].strip() if k < len(row) else "" for row in body] for k, name in enumerate(self.names)}
 
-    @property
+    @cached_property
     def numbers(self) -> dict[str, list[float]]:
         """The numbers of every column."""
         read = self.notation.number
         return {name: [n for cell in cells if (n := read(cell)) is not None] for name, cells in self.columns.items()}
 
-    @property
+    @cached_property
     def hints(self) -> dict[str, str]:
         """Name and unit of every column: of the line of units below the names, else what all its numbers have behind them."""
         below = self.header is not None and self.data > self.header + 1

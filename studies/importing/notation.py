@@ -43,7 +43,8 @@ class Notation:
 
 
 @functools.lru_cache
-def _pattern(decimal: str, thousands: str) -> re.Pattern[str]:
+def pattern_of(decimal: str, thousands: str) -> re.Pattern[str]:
+    """Return the pattern of a number that is written by two signs."""
     whole = rf"(?:\d{{1,3}}(?:{re.escape(thousands)}\d{{3}})+|\d+)" if thousands else r"\d+"
     return re.compile(rf"[+-]?(?:{whole}(?:[{decimal}]\d*)?|[{decimal}]\d+){EXPONENT}")
 
@@ -56,7 +57,7 @@ def read_number(cell: str, decimal: str, thousands: str) -> tuple[float, str] | 
     number, unit = found[1], found[2] or ""
     if decimal == "," and "," not in number and thousands != "." and not _is_grouped(number, "."):
         decimal = "."
-    if not _pattern(decimal, thousands).fullmatch(number):
+    if not pattern_of(decimal, thousands).fullmatch(number):
         return None
     return float((number.replace(thousands, "") if thousands else number).replace(decimal, ".")), unit
 

@@ -23,7 +23,7 @@ from studies.files.given import shorten
 from studies.files.numbers import ROWS_AT_ONCE, parse_portions
 from studies.files.reading import ANY_SIZE, PORTION, digest, opened
 from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
-from studies.importing.notation import find_second, read_number
+from studies.importing.notation import find_second, pattern_of, read_number
 from studies.importing.sheets import EXCEL, read_sheets
 from studies.importing.tables import ParsedTable, Part, RawTable, check_column
 from studies.importing.units import find_spelling
@@ -67,9 +67,11 @@ class TextTable(RawTable):
 
         text, decimal, thousands = self.text(column), self.file.decimal, self.file.thousands
         empty = np.asarray(text.isin(["", *self.missing]))
-        plain = text.str.replace(",", ".", regex=False) if decimal == "," else text
+        plain = text
         if decimal == "," or thousands:  # a point may part thousands
-            plain = plain.mask(text.str.contains(f"[.{thousands}]" if decimal == "," else f"[{thousands}]"))
+            plain = plain.where(plain.str.fullmatch(pattern_of(decimal, thousands)))
+            plain = plain.str.replace(thousands, "", regex=False) if thousands else plain
+            plain = plain.str.replace(decimal, ".", regex=False)
         values = pd.to_numeric(plain.mask(empty, "nan"), errors="coerce").to_numpy(dtype=float, copy=True)
         careful = np.flatnonzero(np.isnan(values) & ~empty).tolist()
         for row, cell in zip(careful, text.to_numpy()[careful], strict=True):

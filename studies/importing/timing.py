@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from studies.importing.clock import DECIMAL_COMMA
 from studies.importing.look import Look, is_stamp
 from studies.importing.mapping import SECONDS
 from studies.importing.meaning import find_meanings, find_unit
@@ -103,7 +102,7 @@ def parse_stamps(text: Sequence[str], form: str) -> list[datetime.datetime]:
     """Return the times of stamps; none at all where one is not of the form."""
     import pandas as pd
 
-    plain = pd.Series(text, dtype=str).str.replace(DECIMAL_COMMA, ".", regex=True)
+    plain = pd.Series(text, dtype=str).str.replace(",", ".", regex=False)
     try:
         times = pd.to_datetime(plain, format="ISO8601" if form == "iso" else form, errors="coerce", utc=True)
     except ValueError:
