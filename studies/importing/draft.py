@@ -188,7 +188,7 @@ def _describe_notation(path: str, look: Look) -> list[str]:
         about = f", {clock.step!r} s apart" if clock and clock.step else ", with their own clock" if clock else ""
         said = [f"# {comment_of(units)}: {named.rows} rows{about}"]
         return [*lines, *([f"group = {spell_value(named.name)}"] if named.name else []), *said]
-    if look.kind == "text":
+    if look.encoding:
         notation = look.notation
         doubt = f"    # CHECK: {comment_of(notation.doubt)}" if notation.doubt else ""
         lines += [f"separator = {spell_value(look.separator)}", f'decimal = "{notation.decimal}"{doubt}']

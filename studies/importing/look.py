@@ -11,7 +11,7 @@ from typing import cast
 from studies.errors import InputError
 from studies.importing.channels import Group, is_container, open_channels, sort_groups
 from studies.importing.meaning import looks_likely
-from studies.importing.notation import Notation, find_notation, is_number, unit_of
+from studies.importing.notation import Notation, find_notation, is_number, is_unit, unit_of
 from studies.importing.raw import decode, name_columns, read_filled, split_line
 from studies.importing.sheets import EXCEL, read_sheets
 
@@ -27,14 +27,13 @@ STAMP = re.compile(
 
 @dataclass(frozen=True)
 class Look:
-    """What a first look at one raw file finds; `header` is None where no line names the columns."""
+    """What a first look at one raw file finds; `header` is None where no line names the columns, encoding and separator are those of a text."""
 
     encoding: str
     separator: str
     rows: list[list[str]]
     header: int | None
     data: int
-    kind: str
     notation: Notation = field(default_factory=Notation)
     group: Group | None = None
     last: int | None = None  # line of the data, where others stand below it
@@ -83,7 +82,7 @@ def look_at(path: str) -> Look:
         with open_channels(path) as channels:
             return look_at_group(sort_groups(channels)[0])
     if Path(path).suffix.lower() in EXCEL:
-        looks = {name: _find_table(rows[:SEEN], rows[-FOOT:], len(rows), "excel") for name, rows in read_sheets(path)}
+        looks = {name: _find_table(rows[:SEEN], rows[-FOOT:], len(rows)) for name, rows in read_sheets(path)}
         if any(looks.values()):
             most = max(looks, key=lambda name: sum(map(len, look.numbers.values())) if (look := looks[name]) else -1)
             return replace(cast(Look, looks[most]), sheet=most, others=tuple(name for name in looks if name != most))
@@ -94,7 +93,7 @@ def look_at(path: str) -> Look:
         lines = decode(path, data, encoding).split("\n")
         separator = _find_separator(lines[:SEEN])
         rows, end = ([_split(line, separator) for line in part] for part in (lines[:SEEN], lines[-FOOT:]))
-        if found := _find_table(rows, end, len(lines) if len(data) < HEAD else 0, "text"):
+        if found := _find_table(rows, end, len(lines) if len(data) < HEAD else 0):
             hints = found.hints
             notation = find_notation(found.columns, lambda name, numbers: looks_likely(hints[name], numbers))
             return replace(found, encoding=encoding, separator=separator, notation=notation)
@@ -102,7 +101,7 @@ def look_at(path: str) -> Look:
     raise InputError(f"{path}: no table with rows of two numbers or more was found{where}; {mend}.")
 
 
-def _find_table(rows: list[list[str]], end: Sequence[Sequence[str]], total: int, kind: str) -> Look | None:
+def _find_table(rows: list[list[str]], end: Sequence[Sequence[str]], total: int) -> Look | None:
     """Find the table among the first rows of a file, and where it ends among its last; None where there is none."""
     filled = max((k + 1 for row in rows for k, cell in enumerate(row) if cell.strip()), default=0)
     rows = [row[:filled] for row in rows]  # a spreadsheet writes separators of empty columns behind the last one
@@ -117,7 +116,7 @@ def _find_table(rows: list[list[str]], end: Sequence[Sequence[str]], total: int,
     # of two lines with a cell for every column the second one holds the units
     header = named[-2] if len(named) > 1 and _is_unit_line(rows[named[-1]]) else named[-1] if named else None
     last = _last_line(rows[first], end, total)
-    return Look("utf-8", ",", rows[:last], header, first, kind, last=last)
+    return Look("", "", rows[:last], header, first, last=last)
 
 
 def _last_line(first: Sequence[str], end: Sequence[Sequence[str]], total: int) -> int | None:
@@ -133,14 +132,13 @@ def look_at_group(group: Group) -> Look:
     columns = [channel.read(0, min(SEEN, channel.rows)).tolist() for channel in group.channels.values()]
     rows = [["" if x != x else repr(x) for x in row] for row in zip(*columns, strict=True)]
     units = [f"[{channel.unit}]" if channel.unit else "" for channel in group.channels.values()]
-    return Look("", "", [list(group.channels), units, *rows], 0, 2, "channels", group=group)
+    return Look("", "", [list(group.channels), units, *rows], 0, 2, group=group)
 
 
 def _is_unit_line(row: Sequence[str]) -> bool:
     """Tell whether the cells look like units: short, or in brackets."""
     cells = [cell.strip() for cell in row if cell.strip()]
-    units = r"[\[(].*[\])]|(m?deg|m?°)?[ _]?[CFK]|m?s|min|h|[kM]?Hz|[mkuµ]?V|(m?deg|°)/(s|h)|arcsec/s|pp[mb]|counts?|-|1|rad(/s)?"
-    return bool(cells) and all(re.fullmatch(units, cell) for cell in cells)
+    return bool(cells) and all(re.fullmatch(r"[\[(].*[\])]|-|1", cell) or is_unit(cell) for cell in cells)
 
 
 def _find_encoding(path: str, data: bytes) -> str:

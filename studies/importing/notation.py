@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from studies.importing.mapping import SECONDS
 from studies.importing.units import find_spelling
 
 PRINTED = str.maketrans({"−": "-", "–": "-", "’": "'", "\u00a0": " ", "\u202f": " ", "\u2009": " "})
@@ -25,6 +24,10 @@ QUANTITIES = (
     "_W",
     "_counts",
 )  # as columns end
+TIMES = (
+    *((r"s|se[ck]\w*", "s"), (r"ms|milli\w*", "ms"), (r"us|micro\w*", "us"), (r"ns|nano\w*", "ns")),
+    *((r"min\w*", "min"), (r"h|hrs?|hours?|std", "h"), (r"d|days?", "days")),
+)
 SMOOTHER = 0.9  # of the way that readings go up and down, over their range
 
 
@@ -87,8 +90,7 @@ def is_unit(text: str) -> bool:
 def find_second(text: str) -> str:
     """Return the unit of time that a text spells, as a map does."""
     plain = text.replace("µ", "u").replace("μ", "u").lower()
-    plain = {"sec": "s", "sek": "s", "d": "days", "day": "days", "hours": "h"}.get(plain, plain)
-    return plain if plain in SECONDS else ""
+    return next((unit for pattern, unit in TIMES if re.fullmatch(pattern, plain)), "")
 
 
 def find_notation(

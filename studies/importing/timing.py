@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from studies.importing.look import Look, is_stamp
 from studies.importing.mapping import SECONDS
 from studies.importing.meaning import find_meanings, find_unit
+from studies.importing.notation import find_second
 
 DATES = (
     *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y"),
@@ -53,21 +54,11 @@ def find_time(look: Look, evenly: bool = False) -> tuple[list[str], str, str]:
     for size, form in UNIX_BY_SIZE:
         if size <= first < 4 * size:
             return [time], form, unsure
-    hint = hints[time].lower().replace("_", " ")
-    for pattern, form in (
-        (r"\bms\b|milli", "ms"),
-        (r"\b(us|µs|μs)\b|micro", "us"),
-        (r"\bns\b|nano", "ns"),
-        (r"\bmin", "min"),
-        (r"\b(h|hours?|std)\b", "h"),
-        (r"\bdays?\b", "days"),
-    ):
-        if re.search(pattern, hint):
-            return [time], form, unsure
+    words = re.findall(r"[^\W\d_]+", hints[time])
+    if unit := next(filter(None, map(find_second, reversed(words))), ""):
+        return [time], unit, unsure
     if 40000 < first < 60000 and any(value % 1 for value in values) and values[-1] - first < LONGEST_RUN:
         return [time], "excel-days", "the values look like Excel's days"
-    if re.search(r"\bs\b|sec|sek", hint):
-        return [time], "s", unsure
     return [time], _likely_unit(values), unsure or "the name states no unit; chosen by the step between rows"
 
 
