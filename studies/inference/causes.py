@@ -180,6 +180,12 @@ def delay_of(found: Inferred) -> tuple[float, float, float]:
     return float(mean[k]), float(np.sqrt(C[k, k])), priors.values[k].sd
 
 
+def by_rows(z: float, sd: float) -> tuple[float, float]:
+    """What the rows alone say of a number, with its deviation, of which beside a prior of unit variance z ± sd is left."""
+    own = 1.0 - min(sd, 0.99) ** 2
+    return z / own, sd / own**0.5
+
+
 def _path_causes(found: Inferred) -> list[Cause]:
     """Return a second lag, radiation, and a sensor that is late, of a heat path that stands in place of one lag."""
     if found.path is None:
@@ -219,15 +225,20 @@ def _delay_cause(found: Inferred) -> list[Cause]:
     if name != "frequency_Hz" or abs(z) < SURE_DELAY:
         return []
     alike = sorted((e for e in library().values() if e.delay is not None), key=lambda e: -(e.delay or 0) * z)
-    delay = Interval.about(abs(z) * usual, sd * usual)
+    priors, states = found.search.linear.problem.priors, [path.states for path in found.search.signatures.paths]
+    law = priors.at(found.numbers.point[: len(priors.values)])
+    slope = law["law.f0_Hz"] * law["law.a1_per_K"]  # f(t − d) = f − d df/dT dT/dt
+    each = 1.0 if z < 0.0 else slope
+    delay, spread = (usual * one for one in by_rows(z, sd))
     return [
         Cause(
             alike[0].name,
             name,
             _within(z),
             tuple(sorted(effect.name for effect in alike[1:])),
-            dict.fromkeys(alike[0].coefficient_names(name), delay) if z < 0 else {},
+            dict.fromkeys(alike[0].coefficient_names(name), Interval.about(-delay * each, spread * abs(each))),
             z**2,
+            peak=abs(delay * slope) * float(np.ptp(np.concatenate([one.rate for one in states]))),
         )
     ]
 

@@ -10,7 +10,7 @@ from studies.calibration.noise_levels import LASTING, stated_noise
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, ResponseResult, gain_of
-from studies.inference.causes import SURE_DELAY, delay_of, farthest
+from studies.inference.causes import SURE_DELAY, by_rows, delay_of, farthest
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import LAST_DIGIT, doubt_of
 
@@ -105,7 +105,7 @@ def _delayed(found: Inferred, name: str) -> str:
     z, sd, usual = delay_of(found)
     if name != found.search.linear.responses[0] or abs(z) < max(SURE_DELAY * sd, LEAST_DELAY):
         return ""
-    delay = z * usual
+    delay = by_rows(z, sd)[0] * usual
     return (
         f"it follows the temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than"
         f" {'one lag predicts' if found.path is None else 'its lags predict'}, as sensors and clocks may; a thermometer lag or a rate effect of this size looks the same"

@@ -229,6 +229,29 @@ def test_telegraph_noise_is_two_levels():
     assert (result.verdict, result.left_over_input) == ("unexplained", "time: switching between two levels")
 
 
+@pytest.mark.parametrize(("late", "name"), [(45.0, "rate-frequency"), (-45.0, "thermometer-lag")])
+def test_what_looks_like_a_delay_is_told_with_the_size_that_its_name_would_have(late, name, only):
+    """f(t − d) = f − d df/dT dT/dt: of a delay that was planted, c = −d df/dT, and of one below 0, a sensor of −d; neither had a size, or one that the prior of a delay, 10 s, drew to 0."""
+    only("rate-frequency", "thermometer-lag", "second-lag")
+    law = {"f0_Hz": 5000.0, "a1_per_K": 8e-5, "a2_per_K2": 0.0, "lag_s": 1500.0, "delay_s": late}
+    noise = {"housing_lag_s": 0.0, "frequency_white_Hz": 2e-3}
+    card = build_instrument({"schema": "hrg.card/1", "name": "late", "law": law, "noise": noise})
+    words = (
+        "ramp 20 30 0.02 then soak 30 3h then ramp 30 15 0.02",
+        "ramp 25 15 0.03 then soak 15 2h then ramp 15 32 0.02",
+    )
+    runs = [simulate_run(card, parse_profile(own), 1 / 30, k).record for k, own in enumerate(words)]
+    found = diagnose_records(runs)
+    (cause,) = found.verdict.causes
+    assert cause.effect == name
+    (size,) = cause.parameters.values()
+    truth = 45.0 if late < 0.0 else -45.0 * 5000.0 * 8e-5
+    assert size.value == pytest.approx(truth, rel=0.2)  # 4 s of 45
+    assert size.low < truth < size.high
+    rate = np.concatenate([np.gradient(run["resonator_temperature_degC"], run["time_s"]) for run in runs])
+    assert cause.peak == pytest.approx(45.0 * 5000.0 * 8e-5 * np.ptp(rate), rel=0.25)
+
+
 def test_inseparable_pair_gets_a_measurement_and_no_run():
     rng = np.random.default_rng(11)
     records = []
