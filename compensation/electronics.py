@@ -1,13 +1,18 @@
 """Electronics between the wave and the loops: gains, phases and angles of the electrodes, delay, steps and noise.
 
-A channel pair maps the plane of the two patterns: G = R(n β) [1 + ½ [[δ + iη, κ], [κ, −δ − iη]]] e^{iφ}, with δ and η the
-relative differences of gain and phase between the channels along cos nθ and sin nθ, κ how far the axes are from being
-square, β a turn of the electrodes and φ the phase error that both share. All errors are small numbers, all amplitudes relative to the commanded one.
+Pick-offs show C_p (X, Y) of the plane of the two patterns, drives make (X, Y) forces C_d c of their commands:
+
+    C_p = G,  C_d = Gᵀ,   G = e^{iφ} diag(g_x e^{iη/2}, g_y e^{−iη/2}) [[cos ½κ, sin ½κ], [sin ½κ, cos ½κ]] R(−n β),
+
+with δ = g_x/g_y − 1 and η the differences of gain and phase between the channels along cos nθ and sin nθ, κ how far the axes are from
+being square, β a turn of the electrodes and φ the phase error that both share. The gains' mean is 1, all amplitudes are relative to the commanded one.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+
+from numpy.typing import ArrayLike
 
 from compensation.actuators import UNLIMITED, Actuators
 from compensation.arrays import Complex
@@ -34,9 +39,10 @@ class Channels:
 
     def matrix(self, harmonic: int) -> Complex:
         """Return G (2, 2)."""
-        uneven = self.gain_ratio + 1j * self.phase_difference
-        stretch = np.eye(2) + np.array([[uneven, self.skew], [self.skew, -uneven]]) / 2
-        return np.asarray(turn(harmonic * self.rotation) @ stretch * np.exp(1j * self.phase))
+        uneven, late = self.gain_ratio / (2 + self.gain_ratio), np.exp(0.5j * self.phase_difference)
+        gains = np.diag([(1 + uneven) * late, (1 - uneven) / late]) * np.exp(1j * self.phase)
+        square, skewed = np.cos(self.skew / 2), np.sin(self.skew / 2)
+        return np.asarray(gains @ [[square, skewed], [skewed, square]] @ turn(-harmonic * self.rotation))
 
 
 @dataclass(frozen=True)
@@ -85,3 +91,14 @@ class Electronics:
     drive: Channels = Channels()
     noise: LoopNoise = LoopNoise()
     actuators: Actuators = UNLIMITED
+
+    def channels(self, harmonic: int, angle: ArrayLike = 0.0) -> tuple[Complex, Complex]:
+        """Return C_p and C_d (..., 2, 2) in the frame of a wave at the azimuth θ."""
+        R = np.moveaxis(turn(harmonic * np.asarray(angle)), (0, 1), (-2, -1))
+        back = np.swapaxes(R, -1, -2)
+        return back @ self.pickoff.matrix(harmonic) @ R, back @ self.drive.matrix(harmonic).T @ R
+
+    def shown(self, harmonic: int, angle: float) -> float:
+        """Return the azimuth (rad) that the pick-offs show of a wave at the azimuth θ, from what is in phase."""
+        pickoff = self.channels(harmonic, angle)[0][:, 0] * np.exp(-1j * self.pickoff.phase)
+        return angle + float(np.arctan2(*pickoff.real[::-1])) / harmonic

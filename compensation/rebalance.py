@@ -4,8 +4,8 @@ Settled, and to first order in the errors of the electronics, the rate loop indi
 
     Ω + Δ(1/τ)/(2 n k) sin 2n(θ − θ_τ) + [(n β − ½ δ sin 2nθ + ½ κ cos 2nθ)/τ − ε ½ Δω sin 2n(θ − θ_ω)] / (n k):
 
-damping anisotropy, the amplitude's drive seen by the rate axis, and quadrature seen through the phase error, with β, δ, κ
-and ε the sums of turn, gain ratio, skew and phase error of pick-off and drive. Where quadrature is nulled by a stiffness the last
+damping anisotropy, the amplitude's drive seen by the rate axis, and quadrature seen through the phase error, with β the turn of
+the drives less that of the pick-offs, δ, κ and ε the sums of gain ratio, skew and phase error of both. Where quadrature is nulled by a stiffness the last
 term is absent. Loops that need more than the actuators give do not hold the wave: said before anything is simulated; a rate that is
 beyond the range for a while turns the wave by n k ∫(Ω − Ω_max) dt, until it is back or lost.
 """
@@ -23,7 +23,7 @@ from compensation.controllers import Loops, require_stable
 from compensation.electronics import Electronics
 from compensation.errors import CompensationError
 from compensation.samples import require_regular
-from compensation.wave import PHYSICAL, StandingWave, turn
+from compensation.wave import PHYSICAL, StandingWave
 
 LOST = 0.3  # node over antinode at which a wave that its force cannot hold has left its azimuth
 TELL = 500  # rows from one word on the progress to the next
@@ -101,8 +101,9 @@ def simulate_rebalance(
 
 
 def settle_rebalance(
-    wave: StandingWave, electronics: Electronics, rate: ArrayLike = 0.0, angle: ArrayLike = 0.0, turn: ArrayLike = 0.0
-) -> LoopRun:
+    wave: StandingWave, electronics: Electronics, rate: ArrayLike = 0.0, angle: ArrayLike = 0.0,
+    turn: ArrayLike = 0.0, precession: ArrayLike | None = None,
+) -> LoopRun:  # fmt: skip
     """Return the output of settled loops, without noise, for any number of rows at once: exact in the electronics' errors.
 
     Integral control shows the pick-offs their command, C_p (P, S) = (1, 0) = C_p m; amplitude a, rate r, quadrature q and ν,
@@ -111,28 +112,30 @@ def settle_rebalance(
         C_d (a, r + iq) − iν m = n θ̇ C_p⁻¹ (0, 1) − A m,
 
     two complex equations; a stiffness acts as iq (m₂, m₁) in the place of C_d (0, iq).
-    `turn` is the θ̇ (rad/s) at which the rate's command turns the wave, as the pick-offs show it.
+    `turn` is the θ̇ (rad/s) at which the rate's command turns the wave, as the pick-offs show it; given a commanded `precession` p
+    instead, r = n p and θ̇ is found. The run's rate is (θ̇ − r/n)/k.
     """
     values = [np.asarray(getattr(wave, name), dtype=float) for name in PHYSICAL]
     shape = np.broadcast_shapes(*(np.shape(x) for x in (*values, rate, angle)), (1,))
     rows = wave.over_rows(shape[0])
-    turning, azimuth, turned = (np.broadcast_to(np.asarray(x, dtype=float), shape) for x in (rate, angle, turn))
+    given = turn if precession is None else precession
+    turning, azimuth, given = (np.broadcast_to(np.asarray(x, dtype=float), shape) for x in (rate, angle, given))
     A = rows.envelope(turning, azimuth)
     # what the electronics make of a wave depends on its azimuth alone
     angles, at = np.unique(azimuth, return_inverse=True)
-    c, s = np.cos(rows.harmonic * angles), np.sin(rows.harmonic * angles)
-    R = np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
-    back = np.swapaxes(R, 1, 2)
-    pickoff = back @ electronics.pickoff.matrix(rows.harmonic) @ R
-    drive = back @ electronics.drive.matrix(rows.harmonic) @ R
+    pickoff, drive = electronics.channels(rows.harmonic, angles)
     moved, across = np.moveaxis(np.linalg.inv(pickoff), -1, 0)
     nulling = moved[:, ::-1] if electronics.actuators.stiff else drive[:, :, 1]
-    acting = np.stack([drive[:, :, 0], drive[:, :, 1], 1j * nulling, -1j * moved], axis=-1)
+    known, sought = across, drive[:, :, 1]
+    if precession is not None:
+        known, sought = -sought, -known
+    acting = np.stack([drive[:, :, 0], sought, 1j * nulling, -1j * moved], axis=-1)
     answer = np.linalg.inv(np.concatenate([acting.real, acting.imag], axis=1))[at]
-    needed = wave.harmonic * turned[:, None] * across[at] - np.einsum("nij,nj->ni", A, moved[at])
-    decay, held, quadrature, nu = np.einsum("nij,nj->in", answer, np.concatenate([needed.real, needed.imag], axis=1))
+    needed = wave.harmonic * given[:, None] * known[at] - np.einsum("nij,nj->ni", A, moved[at])
+    decay, found, quadrature, nu = np.einsum("nij,nj->in", answer, np.concatenate([needed.real, needed.imag], axis=1))
+    ahead = given - found / rows.harmonic if precession is None else found / rows.harmonic - given
     return LoopRun(
-        np.arange(shape[0], dtype=float), -held / rows.coupling, quadrature, decay, rows.omega + nu, azimuth.copy()
+        np.arange(shape[0], dtype=float), ahead / rows.bryan_factor, quadrature, decay, rows.omega + nu, azimuth.copy()
     )
 
 
@@ -160,13 +163,11 @@ def close_loops(
     wave: StandingWave, electronics: Electronics, loops: Loops, rate: float, angle: float
 ) -> tuple[ClosedLoop, Array]:
     """Return the loops closed about a wave held at an azimuth (rad), and what the pick-offs' errors add to their reading."""
-    R = turn(wave.harmonic * angle)
     settled = settle_rebalance(wave, electronics, rate, angle)
     A = wave.envelope(rate, angle) - 1j * (settled.omega[0] - float(wave.omega)) * np.eye(2)
     if electronics.actuators.stiff:
         A = A + 1j * settled.quadrature[0] * np.array([[0.0, 1.0], [1.0, 0.0]])
-    pickoff = R.T @ electronics.pickoff.matrix(wave.harmonic) @ R
-    drive = R.T @ electronics.drive.matrix(wave.harmonic) @ R
+    pickoff, drive = electronics.channels(wave.harmonic, angle)
     seen = pickoff[:, 0]
     offset = np.array([seen[0].real - 1, seen[0].imag, seen[1].real, seen[1].imag])
     return ClosedLoop(A, pickoff, drive, loops, electronics), offset

@@ -99,8 +99,8 @@ class StandingWave:
         return replace(self, **numbers)
 
 
-def turn(angle: float) -> Array:
-    """Return the rotation R(ψ) of the plane."""
+def turn(angle: ArrayLike) -> Array:
+    """Return the rotation R(ψ) of the plane (2, 2, ...)."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, -sine], [sine, cosine]])
 

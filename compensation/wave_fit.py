@@ -10,7 +10,7 @@ With x = 2 n θ of the turning wave, and to first order (`whole_angle`):
 
 beside what scale the applied and the commanded turn have, and in drive, frequency and quadrature what the force of a commanded turn leaks, which goes with its rate.
 C = Δ(1/τ) (cos 2nθ_τ, sin 2nθ_τ) − (δ + δ_d, κ + κ_d)/τ as the driven wave has it, W = Δω (cos 2nθ_ω, sin 2nθ_ω), δ and κ
-gain ratio and skew of the pick-offs, which also make the amplitude uneven that a commanded turn c (1/s) acts on, ε the phase error of the whole path. A wave that turns at one rate only cannot tell
+difference of gain over its mean and skew of the pick-offs, which also make the amplitude uneven that a commanded turn c (1/s) acts on, ε the phase error of the whole path. A wave that turns at one rate only cannot tell
 κ, δ and leakage from damping: turn it both ways. The drives' own gains (index d) act as damping does, and only a run-down without drive
 tells them apart; they are taken as given. Drives turned by β against the pick-offs (index d again) let the nulled quadrature shift the frequency and the amplitude's drive
 turn the wave: frequency and turn show W and C turned by −nβ, and a commanded turn c needs n β c of drive more, which turning both ways takes out.
@@ -26,6 +26,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.arrays import Array
+from compensation.electronics import Channels
 from compensation.errors import CompensationError
 from compensation.noise_regression import fit_coloured
 from compensation.ringdown.answer import Estimate
@@ -49,7 +50,7 @@ class WaveFit:
     """Estimates by name, and sentences on what could not be determined.
 
     Names: `decay` 1/τ (1/s), `damping_split` Δ(1/τ) (1/s), `damping_axis` (rad), `frequency_split` (rad/s),
-    `frequency_axis` (rad), `gain_ratio` δ, `skew` κ (rad), `phase_error` ε (rad), `rate` (rad/s, what is left of the rate).
+    `frequency_axis` (rad), `gain_ratio` g_x/g_y − 1, `skew` κ (rad), `phase_error` ε (rad), `rate` (rad/s, what is left of the rate).
     Columns are named as the arguments; the damping of `rate` takes ε from all (as 0 where they contradict each other).
     """
 
@@ -103,9 +104,9 @@ def fit_whole_angle(
     # In one direction what a commanded turn leaks through uneven gains is not told from the splits.
     leak = 0.0 if both_ways else float(np.mean(command))
     phi = coupling * np.concatenate([[0.0], np.cumsum(indicated[:-1] - known)]) * step
-    card = np.array([pickoff_gain_ratio, pickoff_skew])
+    card = np.array([2 * pickoff_gain_ratio / (2 + pickoff_gain_ratio), pickoff_skew])
     gains, spread = np.zeros(2) if both_ways else card, UNEVEN
-    drives, lost = np.array([drive_gain_ratio, drive_skew]), np.flatnonzero(bad["rate"][:-1])[:FEW]
+    drives, lost = np.array([2 * drive_gain_ratio / (2 + drive_gain_ratio), drive_skew]), np.flatnonzero(bad["rate"][:-1])[:FEW]
     for _ in range(4):
         behind = straighten(x / 2, *gains)
         mean, turned, missed, spread, odd = _turned(
@@ -137,7 +138,7 @@ def fit_whole_angle(
     if epsilon is not None and not wrong:
         estimates["phase_error"] = epsilon
     if both_ways and "damping" not in wrong:
-        estimates |= {"gain_ratio": (gains[0], spread[0]), "skew": (gains[1], spread[1])}
+        estimates |= {"gain_ratio": (2 * gains[0] / (2 - gains[0]), spread[0]), "skew": (gains[1], spread[1])}
 
     def true(one: Told) -> Told:
         """Damping as it is without the gains, which the driven wave has in it."""
@@ -236,10 +237,10 @@ def _widen(
     return {name: (value, float(np.hypot(sd, left_out.get(name, 0.0)))) for name, (value, sd) in estimates.items()}
 
 
-def straighten(psi: Array, gain_ratio: float, skew: float) -> Array:
-    """Return ψ − ψ_m, what the pick-offs' gain ratio and skew take from the angle that they show (rad)."""
-    stretch = np.eye(2) + np.array([[gain_ratio, skew], [skew, -gain_ratio]]) / 2
-    x, y = np.linalg.solve(stretch, np.array([np.cos(psi), np.sin(psi)]))
+def straighten(psi: Array, uneven: float, skew: float) -> Array:
+    """Return ψ − ψ_m, what the pick-offs' gains, uneven by δ, and skew take from the angle that they show (rad)."""
+    pickoff = Channels(2 * uneven / (2 - uneven), skew=skew).matrix(1).real
+    x, y = np.linalg.solve(pickoff, np.array([np.cos(psi), np.sin(psi)]))
     return np.asarray(np.arctan2(y * np.cos(psi) - x * np.sin(psi), x * np.cos(psi) + y * np.sin(psi)))
 
 

@@ -1,14 +1,12 @@
 """Whole angle: the wave precesses freely, or at a commanded rate (self-precession), and its azimuth is the output.
 
-    ψ̇ = n k Ω + ½ Δ(1/τ) sin 2(ψ − ψ_τ) + Δω s cos 2(ψ − ψ_ω) + Re u/a,     ψ = n θ,
+    (Ṗ, Ṡ) = R(−ψ) C_p [A C_p⁻¹ R(ψ) (P, S) + C_d R(ψ) (a, r + iq)] − ψ̇ J (P, S),     Re S = 0 gives ψ̇,     ψ = n θ,
 
-s the quadrature that the loop leaves (−q/a), a the amplitude over its command, and u the force across the wave: the commanded turn, and what gain ratios,
-skew and phase errors let through from amplitude drive and quadrature control. Amplitude, phase and quadrature loops are
-`closed_loop` in the frame of the wave, driven by what the turning wave meets; errors of the electronics are kept to first
-order there, and exactly in the measured azimuth.
+P and S antinode and node as the pick-offs show them, A the averaged dynamics (`wave`), r = n times the commanded turn. Amplitude, phase and
+quadrature loops are `closed_loop` in this frame without errors of the electronics; how what the turning wave meets departs
+from that drives them, exact but for products of what varies within a step.
 """
 
-import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,12 +19,12 @@ from compensation.arrays import Array
 from compensation.closed_loop import ClosedLoop, RowMap
 from compensation.controllers import Loops, require_stable
 from compensation.electronics import Electronics
-from compensation.rebalance import TELL, LoopRun, samples_in_row
+from compensation.rebalance import TELL, LoopRun, samples_in_row, settle_rebalance
 from compensation.wave import StandingWave
 
 TURN = 0.1  # largest turn of 2ψ (rad) in one step
-Means = tuple[float, float, float, float, float]
-"""Means over a step: commands of amplitude and quadrature, the quadrature left, the amplitude, its phase (rad)."""
+Means = tuple[complex, complex, float, float, float]
+"""Means over a step: antinode P and node S, commands of amplitude, phase and quadrature."""
 WITHOUT_RATE = ("amplitude", "phase", "quadrature")
 
 
@@ -46,10 +44,11 @@ def simulate_whole_angle(
     loop.require_stable()
     maps: dict[int, RowMap] = {}
     h = samples * loops.step
+    angle, offset = electronics.shown(rows.harmonic, angle), np.zeros(4)
     psi = rows.harmonic * angle
-    means = (float(rows.decay(angle)[0]), float(rows.quadrature(angle)[0]), 0.0, 1.0, 0.0)
-    forcing = course.forcing(0, 0.0, psi, means)
-    state = loop.settle(forcing, course.offset(0, psi))
+    settled = settle_rebalance(rows.at_row(0), electronics, turning[0], angle, precession=commanded[0])
+    means = (1.0 + 0j, 0j, float(settled.decay[0]), course.start - float(settled.omega[0]), float(settled.quadrature[0]))
+    state = loop.settle(course.forcing(0, 0.0, psi, means), offset)
     at = loop.places
     noise = electronics.noise
     readout = math.sqrt(noise.measurement_variance(loops.sampling) * loops.smoothing / (2 - loops.smoothing))
@@ -57,7 +56,7 @@ def simulate_whole_angle(
     for n in range(len(t)):
         if n % TELL == 0:
             progress(n / len(t))
-        measured[n] = course.measured(psi) + (generator.normal(0, readout) if generator is not None else 0.0)
+        measured[n] = psi + (generator.normal(0, readout) if generator is not None else 0.0)
         pieces = min(samples, math.ceil(2 * abs(course.turn(n, 0.0, psi, means)) * h / TURN) or 1)
         total = np.zeros(4)
         for piece in range(pieces):
@@ -73,10 +72,10 @@ def simulate_whole_angle(
                 centre = course.forcing(n, (begin + end) / 2, (psi + psi_end) / 2, means)
                 bow = (2 * centre - first - last) / 3  # gives the straight line the mean of the bent one
                 ends = first + bow, last + bow
-                offsets = course.offset(n, psi), course.offset(n, psi_end)
-                new = row.map @ row.start(state, ends, offsets, step) + shake
-                sums, waves = new[at["sum"]] / part, new[at["wave_sum"]] / part
-                means = (float(sums[0]), float(sums[3]), float(waves[3]), 1 + float(waves[0]), float(waves[1]))
+                new = row.map @ row.start(state, ends, (offset, offset), step) + shake
+                amplitude, phase, _, quadrature = (new[at["sum"]] / part).tolist()
+                antinode, late, _, left = (new[at["wave_sum"]] / part).tolist()
+                means = 1 + antinode + 1j * late, 1j * left, amplitude, phase, quadrature
                 middle = (psi + psi_end) / 2
                 psi_end = psi + step / 6 * (
                     course.turn(n, begin, psi, means)
@@ -93,9 +92,8 @@ def simulate_whole_angle(
     use = electronics.actuators.use(course.command, commands[:, 3], commands[:, 0])
     worst = int(np.argmax(np.max([use.across, use.quadrature, use.drive], axis=0)))
     require_range(electronics.actuators.use(course.command[worst], *commands[worst, [3, 0]]), f"at {t[worst]:g} s")
-    after = course.measured(psi)
     theta = measured / rows.harmonic
-    turned = np.diff(np.append(theta, after / rows.harmonic)) / h
+    turned = np.diff(np.append(theta, psi / rows.harmonic)) / h
     indicated = (turned - (commanded + np.append(commanded[1:], commanded[-1])) / 2) / rows.bryan_factor
     return LoopRun(t, indicated, commands[:, 3], commands[:, 0], course.start - commands[:, 1], theta)
 
@@ -118,84 +116,53 @@ class _Course:
 
     def __post_init__(self) -> None:
         rows = self.rows
-        n = rows.harmonic
         self.start = float(rows.at_row(0).omega)
-        drift = np.asarray(rows.omega) - self.start
-        columns = [
-            1 / np.asarray(rows.tau),
-            drift,
-            rows.coupling * self.rate,
-            self.command,
-            rows.damped(),
-            rows.detuned(),
-        ]
-        self.columns = np.stack(columns, axis=1).tolist()
+        growth = 1j * (np.asarray(rows.omega) - self.start) - 1 / np.asarray(rows.tau)
+        damped, detuned = rows.damped(), rows.detuned()
+        even, odd = 1j * detuned.real - damped.real, 1j * detuned.imag - damped.imag
+        self.columns = np.stack([growth, rows.coupling * self.rate, self.command, even, odd], axis=1).tolist()
         self.columns.append(self.columns[-1])
-        pickoff, drive = self.electronics.pickoff, self.electronics.drive
-        self.pickoff = (pickoff.matrix(n) * cmath.exp(-1j * pickoff.phase)).tolist()
-        self.drive = (drive.matrix(n) * cmath.exp(1j * pickoff.phase)).tolist()
+        pickoff, drive = self.electronics.channels(rows.harmonic)
+        back = np.linalg.inv(pickoff)
+        J, S_even, S_odd = np.array([[0, -1], [1, 0]]), np.diag([1, -1]), np.array([[0, 1], [1, 0]])
+        self.seen = [(pickoff @ one @ back).ravel().tolist() for one in (J, S_even, S_odd)]
+        self.drive = (pickoff @ drive).ravel().tolist()
         self.stiff = self.electronics.actuators.stiff
-        self.ideal = pickoff == type(pickoff)() and drive == type(drive)()
+        self.mean = float(np.mean(1 / np.asarray(rows.tau)))  # of `close_without_rate`
 
-    def values(self, row: int, fraction: float, psi: float) -> tuple[list[float], complex, complex]:
-        """1/τ, ω − ω₀, n k Ω and commanded ψ̇, linear between rows; ½Δ(1/τ) e^{2i(ψ_τ − ψ)} and ½Δω e^{2i(ψ_ω − ψ)}."""
+    def growth(self, row: int, fraction: float, psi: float, means: Means) -> tuple[complex, complex]:
+        """Growth of antinode and node as the pick-offs show them, C_p (A C_p⁻¹ (P, S) + C_d c), in the frame of ψ."""
         now = self.columns[row]
         if fraction:
             now = [a + fraction * (b - a) for a, b in zip(now, self.columns[row + 1], strict=True)]
-        turned = cmath.exp(-2j * psi)
-        return [one.real for one in now[:4]], now[4] * turned, now[5] * turned
-
-    def measured(self, psi: float) -> float:
-        """The angle ψ that the pick-offs show."""
-        if self.ideal:
-            return psi
-        (xx, xy), (yx, yy) = self.pickoff
+        P, S, amplitude, phase, quadrature = means
+        grown, coriolis, command, even, odd = now
         c, s = math.cos(psi), math.sin(psi)
-        seen = math.atan2((yx * c + yy * s).real, (xx * c + xy * s).real)
-        return psi + (seen - psi + math.pi) % (2 * math.pi) - math.pi
-
-    def forces(self, psi: float, command: float, means: Means) -> tuple[complex, complex]:
-        """The forces along and across the wave that commands (along a, across + i quadrature) become; a stiffness is none."""
-        along, across = means[0], complex(command, 0.0 if self.stiff else means[1])
-        if self.ideal:
-            return along, across
-        return _through(self.drive, along, across, self.measured(psi), psi)
+        across = command
+        if self.stiff:  # iq couples the patterns of the frame
+            even, odd = even - 2j * c * s * quadrature, odd + 1j * (c * c - s * s) * quadrature
+        else:
+            across += 1j * quadrature
+        a, b, d, e = (coriolis * j + even * g + odd * h for j, g, h in zip(*self.seen, strict=True))
+        f, g, h, i = self.drive
+        x, y, u, v = c * P - s * S, s * P + c * S, c * amplitude - s * across, s * amplitude + c * across
+        x, y = a * x + b * y + f * u + g * v, d * x + e * y + h * u + i * v
+        own = grown + 1j * phase
+        return c * x + s * y + own * P, c * y - s * x + own * S
 
     def turn(self, row: int, fraction: float, psi: float, means: Means) -> float:
-        """ψ̇ (rad/s)."""
-        (_, _, coriolis, command), damped, detuned = self.values(row, fraction, psi)
-        across = self.forces(psi, command, means)[1]
-        forced = 2 * detuned.real * means[2] + across.real + across.imag * means[4]
-        return coriolis - damped.imag + forced / means[3]
+        """ψ̇ (rad/s), which keeps the node's part in phase at 0."""
+        return self.growth(row, fraction, psi, means)[1].real / means[0].real
 
     def forcing(self, row: int, fraction: float, psi: float, means: Means) -> Array:
-        """What drives amplitude, phase and quadrature from their commands (1/s)."""
-        (decay, drift, _, command), damped, detuned = self.values(row, fraction, psi)
-        along, across = self.forces(psi, command, means)
-        # a stiffness couples the patterns against the split
-        coupled = -detuned.imag - (means[1] if self.stiff else 0.0)
+        """What drives amplitude, phase and quadrature from their commands (1/s), beside their own decay and the commands as they are."""
+        along, across = self.growth(row, fraction, psi, means)
+        P, S, amplitude, phase, quadrature = means
+        turn = across.real / P.real
+        along += turn * S + self.mean * (P - 1)
         return np.array([
-            -decay - damped.real + coupled * means[2] + along.real - means[0],
-            drift + detuned.real - damped.imag * means[2] + along.imag,
+            along.real - amplitude,
+            along.imag - phase,
             0.0,
-            -coupled * means[3] + across.imag - means[1],
+            across.imag - turn * P.imag + self.mean * S.imag - quadrature,
         ])  # fmt: skip
-
-    def offset(self, row: int, psi: float) -> Array:
-        """What the pick-offs add to amplitude, phase and quadrature."""
-        if self.ideal:
-            return np.zeros(4)
-        along, across = _through(self.pickoff, 1.0, 0.0, psi, self.measured(psi))
-        return np.array([along.real - 1, along.imag, 0.0, across.imag])
-
-
-def _through(
-    channels: list[list[complex]], along: complex, across: complex, at: float, to: float
-) -> tuple[complex, complex]:
-    """What parts along and across an angle become in channels, along and across another angle."""
-    (xx, xy), (yx, yy) = channels
-    c, s = math.cos(at), math.sin(at)
-    x, y = c * along - s * across, s * along + c * across
-    x, y = xx * x + xy * y, yx * x + yy * y
-    c, s = math.cos(to), math.sin(to)
-    return c * x + s * y, c * y - s * x

@@ -85,10 +85,7 @@ def simulate_carrier(
         raise CompensationError("the carrier is followed with whole samples of delay and whole cycles in a sample.")
     count = round(cycles) * readings
     h = loops.step / count
-    R, G_p, G_d = (
-        turn(wave.harmonic * angle),
-        *(c.matrix(wave.harmonic) for c in (electronics.pickoff, electronics.drive)),
-    )
+    R, (G_p, G_d) = turn(wave.harmonic * angle), electronics.channels(wave.harmonic)
     K, K_i = np.array([loops.gains(name) for name in loops.NAMES]).T
     noise, limits = electronics.noise, electronics.actuators
     start = omega + float(wave.detuning(angle))

@@ -119,7 +119,7 @@ def test_closed_form_of_the_bias():
     electronics = Electronics(Channels(1e-3, 0.0, 2e-3, 1e-3, 3e-3), Channels(5e-4, 0.0, -1e-3, 5e-4, 2e-3))
     angle, time = 0.2, np.arange(0.0, 10.0)
     run = simulate_rebalance(wave, electronics, Loops(), time, rate=1e-4, angle=angle)
-    leak = 2 * 1.5e-3 - 1.5e-3 / 2 * np.sin(4 * angle) + 1e-3 / 2 * np.cos(4 * angle)
+    leak = 2 * (5e-4 - 1e-3) - 1.5e-3 / 2 * np.sin(4 * angle) + 1e-3 / 2 * np.cos(4 * angle)
     expected = 1e-4 + wave.drift(angle) + (leak / wave.tau - 5e-3 * wave.quadrature(angle)) / wave.coupling
     assert run.rate[-1] == pytest.approx(expected, rel=0.01)
 

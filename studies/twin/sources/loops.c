@@ -17,64 +17,77 @@ static Complex over(Complex a, Complex b) {
 
 static double radians(double degrees) { return degrees * (PI / 180); }
 
-/* G = R(n beta) [1 + ((delta + i eta, kappa), (kappa, -delta - i eta))/2] e^(i phi), seen in the frame of the azimuth. */
+typedef struct { double decay; Complex damped, detuned; } Wave; /* 1/tau, D(1/tau)/2 e^(2 i n axis), Dw/2 e^(2 i n axis); 1/s */
+
+/* G = e^(i phi) diag(gx e^(i eta/2), gy e^(-i eta/2)) ((cos, sin), (sin, cos))(kappa/2) R(-n beta), in the frame of the azimuth; of drives, its transpose. */
 static void channels(double ratio, double difference, double skew, double phase, double turned, double angle, Complex G[2][2]) {
-    const Complex e = {cos(phase), sin(phase)}, stretch[2][2] = {{{1 + ratio / 2, difference / 2}, {skew / 2, 0}},
-                                                                  {{skew / 2, 0}, {1 - ratio / 2, -difference / 2}}};
-    const double c = cos(HARMONIC * angle), s = sin(HARMONIC * angle), b = HARMONIC * turned - HARMONIC * angle;
-    const double left[2][2] = {{cos(b), -sin(b)}, {sin(b), cos(b)}}, right[2][2] = {{c, -s}, {s, c}};
+    const double uneven = ratio / (2 + ratio), larger = 1 + uneven, less = 1 - uneven, c = cos(skew / 2), s = sin(skew / 2);
+    const Complex gain[2] = {{larger * cos(phase + difference / 2), larger * sin(phase + difference / 2)},
+                             {less * cos(phase - difference / 2), less * sin(phase - difference / 2)}};
+    const double a = HARMONIC * angle, b = HARMONIC * (angle - turned), axes[2][2] = {{c, s}, {s, c}};
+    const double left[2][2] = {{cos(a), sin(a)}, {-sin(a), cos(a)}}, right[2][2] = {{cos(b), -sin(b)}, {sin(b), cos(b)}};
     for (int i = 0; i < 2; ++i)
         for (int j = 0; j < 2; ++j) {
-            Complex sum = {0, 0};
-            for (int k = 0; k < 2; ++k)
-                for (int l = 0; l < 2; ++l) {
-                    const double f = left[i][k] * right[l][j];
-                    sum = plus(sum, (Complex){stretch[k][l].re * f, stretch[k][l].im * f});
-                }
-            G[i][j] = times(sum, e);
+            G[i][j] = (Complex){0, 0};
+            for (int k = 0; k < 2; ++k) {
+                const double part = left[i][k] * (axes[k][0] * right[0][j] + axes[k][1] * right[1][j]);
+                G[i][j] = plus(G[i][j], (Complex){gain[k].re * part, gain[k].im * part});
+            }
         }
 }
 
-/* Settled loops: C_d (a, r + iq) - i nu m = n turn C_p^-1 (0, 1) - A m with C_p m = (1, 0); a stiffness acts as iq (m2, m1).
- * `turn` (rad/s) is what the command of the rate makes of the azimuth. `said`: frequency (Hz), rate (rad/s), 1/Q, held quadrature (1/s). */
-static void settle(Twin *w, double frequency, double loss, const double *wave, double rate, double angle, double turned, double *said) {
-    const double *p = w->p, omega = 2 * PI * frequency, decay = omega * loss / 2, coupling = HARMONIC * TWIN_BRYAN;
-    Complex P[2][2], D[2][2], A[2][2], m[2];
+static void pickoffs(const double *p, double angle, Complex P[2][2]) {
     channels(p[P_loop_pickoff_gain_ratio], radians(p[P_loop_pickoff_phase_difference_deg]), 1e-3 * p[P_loop_pickoff_skew_mrad],
              radians(p[P_loop_pickoff_phase_deg]), 0.0, angle, P);
+}
+
+/* The wave at a temperature; `wave`: anisotropy of 1/Q with its axis. */
+static Wave wave_of(const double *p, double frequency, double loss, const double *wave) {
+    const double own = PI * 1e-3 * p[P_loop_frequency_split_mHz], axis = 2 * HARMONIC * radians(p[P_loop_frequency_axis_deg]);
+    return (Wave){PI * frequency * loss, {PI * frequency * wave[0] / 2, PI * frequency * wave[1] / 2},
+                  {own * cos(axis) + PI * TWIN_SPLIT_RE, own * sin(axis) + PI * TWIN_SPLIT_IM}};
+}
+
+/* Settled loops: C_d (a, r + iq) - i nu m = n turn C_p^-1 (0, 1) - A m with C_p m = (1, 0); a stiffness acts as iq (m2, m1).
+ * `found`: a, r of a wave that is held or n turn (rad/s) of one that turns freely at n `command` = r, q, and nu (1/s). */
+static void settle(const double *p, const Wave *wave, double rate, double angle, double command, double *found) {
+    const double coriolis = HARMONIC * TWIN_BRYAN * rate;
+    Complex P[2][2], D[2][2], A[2][2], m[2];
+    pickoffs(p, angle, P);
     channels(p[P_loop_drive_gain_ratio], radians(p[P_loop_drive_phase_difference_deg]), 1e-3 * p[P_loop_drive_skew_mrad],
              radians(p[P_loop_drive_phase_deg]), 1e-3 * p[P_loop_misalignment_mrad], angle, D);
-    const double own = PI * 1e-3 * p[P_loop_frequency_split_mHz], axis = 2 * HARMONIC * radians(p[P_loop_frequency_axis_deg]);
     const Complex turn = {cos(2 * HARMONIC * angle), -sin(2 * HARMONIC * angle)};
-    const Complex damped = times((Complex){omega * wave[0] / 4, omega * wave[1] / 4}, turn);
-    const Complex detuned = times((Complex){own * cos(axis) + PI * TWIN_SPLIT_RE, own * sin(axis) + PI * TWIN_SPLIT_IM}, turn);
+    const Complex damped = times(wave->damped, turn), detuned = times(wave->detuned, turn);
     const Complex along = {-damped.re, detuned.re}, across = {-damped.im, detuned.im};
-    A[0][0] = (Complex){along.re - decay, along.im};
-    A[1][1] = (Complex){-along.re - decay, -along.im};
-    A[0][1] = (Complex){across.re - coupling * rate, across.im};
-    A[1][0] = (Complex){across.re + coupling * rate, across.im};
+    A[0][0] = (Complex){along.re - wave->decay, along.im};
+    A[1][1] = (Complex){-along.re - wave->decay, -along.im};
+    A[0][1] = (Complex){across.re - coriolis, across.im};
+    A[1][0] = (Complex){across.re + coriolis, across.im};
     const Complex minus = {-1, 0}, determinant = plus(times(P[0][0], P[1][1]), times(minus, times(P[0][1], P[1][0])));
     m[0] = over(P[1][1], determinant);
     m[1] = over(times(minus, P[1][0]), determinant);
-    const Complex across_of[2] = {over(times(minus, P[0][1]), determinant), over(P[0][0], determinant)};
-    double matrix[16], right[4];
+    const Complex turning[2] = {over(P[0][1], determinant), over(times(minus, P[0][0]), determinant)}; /* -C_p^-1 (0, 1) */
+    double matrix[16];
     for (int i = 0; i < 2; ++i) {
-        const Complex nulling = TWIN_STIFF ? m[1 - i] : D[i][1];
-        const Complex columns[4] = {D[i][0], D[i][1], {-nulling.im, nulling.re}, {m[i].im, -m[i].re}};
-        const Complex moving = times((Complex){HARMONIC * turned, 0}, across_of[i]);
-        const Complex needed = plus(moving, times(minus, plus(times(A[i][0], m[0]), times(A[i][1], m[1]))));
+        const Complex nulling = TWIN_STIFF ? m[1 - i] : D[1][i], forced = times((Complex){HARMONIC * command, 0}, D[1][i]);
+        const Complex columns[4] = {D[0][i], TWIN_FREE ? turning[i] : D[1][i], {-nulling.im, nulling.re}, {m[i].im, -m[i].re}};
+        const Complex needed = times(minus, plus(forced, plus(times(A[i][0], m[0]), times(A[i][1], m[1]))));
         for (int k = 0; k < 4; ++k) {
             matrix[i * 4 + k] = columns[k].re;
             matrix[(i + 2) * 4 + k] = columns[k].im;
         }
-        right[i] = needed.re;
-        right[i + 2] = needed.im;
+        found[i] = needed.re;
+        found[i + 2] = needed.im;
     }
-    twin_solve(4, matrix, right);
-    said[0] = (omega + right[3]) / (2 * PI);
-    said[1] = -right[1] / coupling;
-    said[2] = 2 * right[0] / (omega + right[3]);
-    said[3] = right[2];
+    twin_solve(4, matrix, found);
+}
+
+/* `said`: frequency (Hz), rate (rad/s), 1/Q, held quadrature (1/s). */
+static void tell(double frequency, double rate, const double *found, double *said) {
+    said[0] = frequency + found[3] / (2 * PI);
+    said[1] = rate;
+    said[2] = found[0] / (PI * said[0]);
+    said[3] = found[2];
 }
 
 /* The largest part of an actuator's range that commands across, of quadrature and along the wave (1/s) take. */
@@ -87,11 +100,14 @@ static double use_of(const double *p, double across, double quadrature, double a
 
 #if !TWIN_FREE
 void twin_settle_loops(Twin *w, double frequency, double loss, const double *wave, double rate, double angle, double *said) {
-    settle(w, frequency, loss, wave, rate, angle, 0.0, said);
-    w->actuator_use = use_of(w->p, HARMONIC * TWIN_BRYAN * said[1], said[3], PI * said[0] * said[2]);
+    const Wave here = wave_of(w->p, frequency, loss, wave);
+    double found[4];
+    settle(w->p, &here, rate, angle, 0.0, found);
+    tell(frequency, -found[1] / (HARMONIC * TWIN_BRYAN), found, said);
+    w->actuator_use = use_of(w->p, found[1], found[2], found[0]);
 }
 #else
-enum { AZIMUTHS = 16, MOST_ROUNDS = 60 };
+enum { AZIMUTHS = 2 * TWIN_TERMS, MOST_ROUNDS = 60 };
 static const double LARGEST_TURN = 0.3, SETTLED = 1e-14;
 
 /* Terms c_0 ... of Re sum c_j e^(2 i j psi) through values at even psi in 0 ... pi; and the sum, by Horner's rule. */
@@ -111,38 +127,35 @@ static double series(const Complex *c, Complex e) {
     return found.re;
 }
 
-/* How much of a turn the pick-offs show, g - 1, and of a force across the wave arrives through the drives, g c - 1. */
+/* What departs from the turn by rate and command alone, of each that it is linear in: 1/tau, parts of damped and detuned, k rate, command. */
 static void see_channels(Twin *w) {
     const double *p = w->p;
-    Complex P[2][2], D[2][2];
-    double g[AZIMUTHS], gc[AZIMUTHS];
-    channels(p[P_loop_pickoff_gain_ratio], radians(p[P_loop_pickoff_phase_difference_deg]), 1e-3 * p[P_loop_pickoff_skew_mrad], 0.0, 0.0, 0.0, P);
-    channels(p[P_loop_drive_gain_ratio], radians(p[P_loop_drive_phase_difference_deg]), 1e-3 * p[P_loop_drive_skew_mrad],
-             radians(p[P_loop_drive_phase_deg] + p[P_loop_pickoff_phase_deg]), 1e-3 * p[P_loop_misalignment_mrad], 0.0, D);
-    const double determinant = P[0][0].re * P[1][1].re - P[0][1].re * P[1][0].re;
-    for (int k = 0; k < AZIMUTHS; ++k) {
-        const double c = cos(PI * k / AZIMUTHS), s = sin(PI * k / AZIMUTHS);
-        const double x = (P[1][1].re * c - P[0][1].re * s) / determinant, y = (P[0][0].re * s - P[1][0].re * c) / determinant;
-        g[k] = determinant * (x * x + y * y) - 1;
-        gc[k] = determinant * (x * (D[1][1].re * c - D[1][0].re * s) - y * (D[0][1].re * c - D[0][0].re * s)) - 1;
+    double values[TWIN_TURNERS][AZIMUTHS], found[4];
+    for (int i = 0; i < TWIN_TURNERS; ++i) {
+        const Wave one = {i == 0, {i == 1, i == 2}, {i == 3, i == 4}};
+        for (int k = 0; k < AZIMUTHS; ++k) {
+            settle(p, &one, (i == 5) / TWIN_BRYAN, PI * k / AZIMUTHS / HARMONIC, i == 6, found);
+            values[i][k] = found[1] / HARMONIC - (i >= 5);
+        }
+        terms(values[i], w->turned[i]);
     }
-    terms(g, w->shown);
-    terms(gc, w->arriving);
-    const double angle = HARMONIC * radians(p[P_bias_pattern_angle_deg]), x = P[0][0].re * cos(angle) + P[0][1].re * sin(angle);
-    const double off = atan2(P[1][0].re * cos(angle) + P[1][1].re * sin(angle), x) - angle + PI;
-    w->azimuth = (angle + off - 2 * PI * floor(off / (2 * PI)) - PI) / HARMONIC;
+    Complex P[2][2];
+    const double start = radians(p[P_bias_pattern_angle_deg]), phase = radians(p[P_loop_pickoff_phase_deg]);
+    pickoffs(p, start, P);
+    const Complex in_phase = {cos(phase), -sin(phase)};
+    w->azimuth = start + atan2(times(P[1][0], in_phase).re, times(P[0][0], in_phase).re) / HARMONIC;
 }
 
 /* What departs from the turn that rate and command would make alone, at a part of the way from one row to the next. */
 static double stray(const Twin *w, const TwinTurning *a, const TwinTurning *b, double part, double azimuth, double command) {
     const Complex e = {cos(2 * HARMONIC * azimuth), sin(2 * HARMONIC * azimuth)};
-    const double g = series(w->shown, e), feigned = series(a->drift, e) * (1 - part) + series(b->drift, e) * part;
-    return TWIN_BRYAN * ((1 + g) * feigned + g * (a->rate + (b->rate - a->rate) * part)) + series(w->arriving, e) * command;
+    const double feigned = series(a->drift, e) * (1 - part) + series(b->drift, e) * part;
+    return feigned + TWIN_BRYAN * series(w->turned[5], e) * (a->rate + (b->rate - a->rate) * part) + series(w->turned[6], e) * command;
 }
 
 static double fastest(const TwinTurning *row, double command) {
     double speed = fabs(TWIN_BRYAN * row->rate) + fabs(command);
-    for (int j = 0; j < TWIN_TERMS; ++j) speed += TWIN_BRYAN * hypot(row->drift[j].re, row->drift[j].im);
+    for (int j = 0; j < TWIN_TERMS; ++j) speed += hypot(row->drift[j].re, row->drift[j].im);
     return 2 * HARMONIC * speed;
 }
 
@@ -169,29 +182,22 @@ static void turn(Twin *w, const TwinTurning *a, const TwinTurning *b, double com
 /* Whole angle: what the rows before have made of the azimuth, and what the loops say there. `before` is the rate that acted when
  * the span since the last row began, `command` the commanded turn (rad/s) since then. */
 void twin_turn_freely(Twin *w, double frequency, double loss, const double *wave, double before, double rate, double command, double span, double *said) {
-    double held[AZIMUTHS], still[4], moving[4];
-    TwinTurning now;
-    for (int k = 0; k < AZIMUTHS; ++k) {
-        settle(w, frequency, loss, wave, 0.0, PI * k / AZIMUTHS / HARMONIC, 0.0, still);
-        held[k] = still[1];
-    }
-    now.rate = rate;
-    terms(held, now.drift);
+    const Wave here = wave_of(w->p, frequency, loss, wave);
+    const double sizes[5] = {here.decay, here.damped.re, here.damped.im, here.detuned.re, here.detuned.im};
+    TwinTurning now = {rate, {{0, 0}}};
+    double found[4];
     if (w->row_time < 0) see_channels(w);
-    else {
+    for (int i = 0; i < 5; ++i)
+        for (int j = 0; j < TWIN_TERMS; ++j) now.drift[j] = plus(now.drift[j], times((Complex){sizes[i], 0}, w->turned[i][j]));
+    if (w->row_time >= 0) {
         w->turning.rate = before;
         turn(w, &w->turning, &now, command, span);
         w->azimuth += TWIN_BRYAN * radians(w->wander / 3600) * span;
     }
     w->turning = now;
-    settle(w, frequency, loss, wave, rate, w->azimuth, 0.0, still);
-    settle(w, frequency, loss, wave, rate, w->azimuth, 1.0, moving);
-    const double turned = (-command / TWIN_BRYAN - still[1]) / (moving[1] - still[1]); /* the command is linear in the turn */
-    settle(w, frequency, loss, wave, rate, w->azimuth, turned, said);
-    said[1] += turned / TWIN_BRYAN;
-    const double own = PI * 1e-3 * w->p[P_loop_frequency_split_mHz], axis = 2 * HARMONIC * radians(w->p[P_loop_frequency_axis_deg]);
-    const double split = hypot(own * cos(axis) + PI * TWIN_SPLIT_RE, own * sin(axis) + PI * TWIN_SPLIT_IM);
-    w->actuator_use = use_of(w->p, HARMONIC * command, split, PI * frequency * (loss + hypot(wave[0], wave[1]) / 2));
+    settle(w->p, &here, rate, w->azimuth, command, found);
+    tell(frequency, (found[1] / HARMONIC - command) / TWIN_BRYAN, found, said);
+    w->actuator_use = use_of(w->p, HARMONIC * command, hypot(here.detuned.re, here.detuned.im), here.decay + hypot(here.damped.re, here.damped.im));
 }
 #endif
 #endif

@@ -18,7 +18,7 @@
 
 enum { IN_RATE, IN_AMPLITUDE, IN_VOLTAGE, IN_QUADRATURE, IN_ANGLE, IN_PRECESSION, TWIN_COMMANDS };
 enum { TARGET_TEMPERATURE, TARGET_FREQUENCY, TARGET_BIAS, TARGET_LOSS, TARGETS };
-enum { FLICKER_TIMES = 18, TWIN_TERMS = 5, TWIN_SAID = 4 };
+enum { FLICKER_TIMES = 18, TWIN_TERMS = 16, TWIN_TURNERS = 7, TWIN_SAID = 4 };
 
 typedef struct { int one, other, parameter; double factor; } TwinLink; /* conductance or exchange area = p * factor */
 typedef struct { int parameter; double factor, slope; } TwinCapacity;  /* p * factor, slope (1/K) about 20 degC; of shell and stem over T */
@@ -32,7 +32,7 @@ typedef struct { double flicker[FLICKER_TIMES], walk, offset, markov; int begun;
 typedef struct { double white, flicker, walk, offset, markov, markov_time; } TwinLevels;
 
 typedef struct { double re, im; } TwinComplex;
-typedef struct { double rate; TwinComplex drift[TWIN_TERMS]; } TwinTurning; /* at a row: rad/s, and the rate that azimuths feign */
+typedef struct { double rate; TwinComplex drift[TWIN_TERMS]; } TwinTurning; /* at a row: rad/s, and the turn that azimuths feign */
 
 typedef struct Twin {
     double p[TWIN_PARAMETERS];
@@ -57,7 +57,7 @@ typedef struct Twin {
      * last row; whether an input is held from a row to the next, or a straight line. */
     double azimuth, said[TWIN_SAID], applied;
     TwinTurning turning;
-    TwinComplex shown[TWIN_TERMS], arriving[TWIN_TERMS];
+    TwinComplex turned[TWIN_TURNERS][TWIN_TERMS];
     int held;
     /* heats by seconds along what the boundary will do, where that is known; else it goes straight on */
     const char *(*onward)(struct Twin *, const void *way, double seconds);
