@@ -11,7 +11,6 @@ being square, β a turn of the electrodes and φ the phase error that both share
 from dataclasses import dataclass
 
 import numpy as np
-
 from numpy.typing import ArrayLike
 
 from compensation.actuators import UNLIMITED, Actuators

@@ -21,7 +21,10 @@ from compensation.rebalance import LoopRun, settle_rebalance
 from compensation.wave import StandingWave
 
 TURN = 0.3  # largest turn of 2 n θ (rad) in one step
-AZIMUTHS, SMALL = 64, 1e-12  # azimuths at which B, g and c are taken, and terms of e^{2 i n θ} that are not kept of them
+AZIMUTHS, SMALL = (
+    64,
+    1e-12,
+)  # azimuths at which B, g and c are taken, and terms of e^{2 i n θ} that are not kept of them
 WINDOW = 0.25  # how far, over the steps that are solved at once, a change of the azimuth can come back to itself
 SETTLED, MOST = 1e-14, 60  # rad, of the azimuth from one round to the next; rounds
 
@@ -47,9 +50,11 @@ def read_turning(
     precession: ArrayLike | None = None, time: Array | None = None,
 ) -> LoopRun:  # fmt: skip
     """Return the output of settled loops for a wave at measured azimuths (N,), rad, turned by `precession` or as the time shows."""
-    if precession is None and time is None:
-        raise CompensationError("a wave that turns needs its commanded turn, or times.")
-    turn = np.gradient(angle, time) if precession is None else 0.0
+    turn: ArrayLike = 0.0
+    if precession is None:
+        if time is None:
+            raise CompensationError("a wave that turns needs its commanded turn, or times.")
+        turn = np.gradient(angle, time)
     found = settle_rebalance(wave, electronics, rate, angle, turn, precession)
     return found if time is None else replace(found, time=time)
 

@@ -106,7 +106,10 @@ def fit_whole_angle(
     phi = coupling * np.concatenate([[0.0], np.cumsum(indicated[:-1] - known)]) * step
     card = np.array([2 * pickoff_gain_ratio / (2 + pickoff_gain_ratio), pickoff_skew])
     gains, spread = np.zeros(2) if both_ways else card, UNEVEN
-    drives, lost = np.array([2 * drive_gain_ratio / (2 + drive_gain_ratio), drive_skew]), np.flatnonzero(bad["rate"][:-1])[:FEW]
+    drives, lost = (
+        np.array([2 * drive_gain_ratio / (2 + drive_gain_ratio), drive_skew]),
+        np.flatnonzero(bad["rate"][:-1])[:FEW],
+    )
     for _ in range(4):
         behind = straighten(x / 2, *gains)
         mean, turned, missed, spread, odd = _turned(

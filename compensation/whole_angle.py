@@ -47,7 +47,13 @@ def simulate_whole_angle(
     angle, offset = electronics.shown(rows.harmonic, angle), np.zeros(4)
     psi = rows.harmonic * angle
     settled = settle_rebalance(rows.at_row(0), electronics, turning[0], angle, precession=commanded[0])
-    means = (1.0 + 0j, 0j, float(settled.decay[0]), course.start - float(settled.omega[0]), float(settled.quadrature[0]))
+    means = (
+        1.0 + 0j,
+        0j,
+        float(settled.decay[0]),
+        course.start - float(settled.omega[0]),
+        float(settled.quadrature[0]),
+    )
     state = loop.settle(course.forcing(0, 0.0, psi, means), offset)
     at = loop.places
     noise = electronics.noise

@@ -22,7 +22,7 @@ class Loop(Keys, frozen=True, kw_only=True):
     self_precession_deg_per_s: Annotated[float, number("commanded precession of a whole-angle wave")] = 0.0
     frequency_split_mHz: Annotated[float, number("Δω/2π held by the quadrature loop, besides [imperfection], [electrodes]", least=0.0, relative_sd=1.0)] = 5.0  # fmt: skip
     frequency_axis_deg: Annotated[float, number("θ_ω, of the higher frequency; ± 26 means unknown", sd=26.0)] = 0.0
-    pickoff_gain_ratio: Annotated[float, number("g_x/g_y − 1", above=-0.5, below=0.5, sd=0.005)] = 0.0
+    pickoff_gain_ratio: Annotated[float, number("g_x/g_y − 1, their mean 1", above=-0.5, below=0.5, sd=0.005)] = 0.0
     pickoff_phase_deg: Annotated[float, number("phase error of both", above=-25.0, below=25.0, sd=0.5)] = 0.0
     pickoff_phase_difference_deg: Annotated[float, number("between the two", above=-25.0, below=25.0, sd=0.1)] = 0.0
     pickoff_skew_mrad: Annotated[float, number("of the two axes from 90°, in n θ", above=-400.0, below=400.0, sd=1.0)] = 0.0  # fmt: skip

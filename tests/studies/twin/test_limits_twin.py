@@ -155,9 +155,13 @@ def test_limits_effect(effects, bare, folder):
         assert moved > 1e-8 or name == "jump", name
 
 
-ERRORS = {f"{side}_{key}": 0.01 for side in ("pickoff", "drive") for key in ("gain_ratio", "phase_deg", "skew_mrad")}
-ERRORS |= {"frequency_split_mHz": 2.0, "frequency_axis_deg": 7.0, "misalignment_mrad": 0.3}
-ERRORS |= {"drive_phase_difference_deg": 0.02}
+ERRORS = {f"{side}_gain_ratio": 0.02 for side in ("pickoff", "drive")} | {
+    "drive_skew_mrad": -20.0,
+    "pickoff_skew_mrad": 30.0,
+}
+ERRORS |= {f"{side}_phase_deg": 1.0 for side in ("pickoff", "drive")} | {"misalignment_mrad": 3.0}
+ERRORS |= {"frequency_split_mHz": 2.0, "frequency_axis_deg": 7.0}
+ERRORS |= {"drive_phase_difference_deg": 2.0, "pickoff_phase_difference_deg": -1.0}
 
 
 @pytest.mark.slow
