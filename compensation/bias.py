@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.integrate import cumulative_trapezoid
 
 from compensation.arrays import Array
 from compensation.constants import NINETY, zero_Celsius
@@ -39,6 +40,7 @@ PARENTS = {
     for name, p in POWERS.items()
 }
 MEMORY = ("lag", "play")
+BLOCK = 10.0  # s over which a frequency or temperature is averaged before a lag is put behind it
 SELECTED_BY_THE_PAPER = ("f", "f^2", "f^3", "fdot", "fdot^2", "f*fdot")
 
 
@@ -54,6 +56,29 @@ class Variable:
 
 FREQUENCY = Variable("frequency", "Hz", "f", 0.0)
 TEMPERATURE = Variable("temperature", "°C", "T", -zero_Celsius)
+
+
+@dataclass(frozen=True)
+class AveragedRun:
+    """One run averaged over the `blocks` of a fit, and its state over the `fine` ones that a compensation has."""
+
+    blocks: Blocks
+    fine: Blocks
+    variable: Variable
+
+    def behind(self, lag: float) -> Array:
+        """Return the state behind a lag (s), which begins settled, averaged over the blocks: (1/w) ∫ x dt of straight lines."""
+        name, blocks, time = self.variable.name, self.blocks, self.fine.time
+        if not lag:
+            return blocks.columns[name]
+        state = follow_lag(self.fine.columns[name], np.diff(time), lag)
+        if time.size == blocks.time.size:
+            return state
+        area = cumulative_trapezoid(state - state[0], time, initial=0)
+        half = 0.5 * blocks.width
+        ends = [np.clip(blocks.time + side, time[0], time[-1]) for side in (-half, half)]
+        first, last = (np.interp(end, time, area) for end in ends)
+        return np.asarray(state[0] + (last - first) / (ends[1] - ends[0]))
 
 
 @dataclass(frozen=True)
@@ -127,32 +152,34 @@ def prepare_run(
     causal: bool = False, variable: Variable = FREQUENCY, memory: Memory = NO_MEMORY,
 ) -> BiasRun:  # fmt: skip
     """Decimate one run to blocks of a width (s), and add the rate over a window (s), `causal` (lag window/2) or not, behind `memory`."""
-    blocks = average_run(time, state, bias, width, variable)
-    lagged = follow_lag(blocks.columns[variable.name], np.diff(blocks.time), memory.lag)
-    return rate_run(blocks, lagged, window, causal=causal, variable=variable, memory=memory)
+    run = average_run(time, state, bias, width, variable)
+    return rate_run(run, run.behind(memory.lag), window, causal=causal, memory=memory)
 
 
-def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float, variable: Variable) -> Blocks:
+def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float, variable: Variable) -> AveragedRun:
     """Return one run averaged over blocks of `width` (s), the part of `prepare_run` that no memory changes."""
     t = np.asarray(time, dtype=np.float64)
     if np.any(np.asarray(state, dtype=np.float64) <= variable.above):
         raise CompensationError(f"a {variable.name} must be above {variable.above:g} {variable.unit}; check its unit.")
     _check_seconds("averaging", width)
     width = max(width, float(np.median(np.diff(t)))) if t.size > 1 else width
-    blocks = average_blocks(t, {variable.name: state, "bias": bias}, width)
+    columns = {variable.name: state, "bias": bias}
+    blocks, fine = (
+        average_blocks(t, columns, least)
+        for least in (width, min(max(BLOCK, 0.999 * float(np.median(np.diff(t)))), width))
+    )
     rows = blocks.time.size
     if rows < 3:
         raise CompensationError(f"averaging over {width:g} s leaves {rows} rows, but at least three are needed; record longer or average less.")  # fmt: skip
     if np.ptp(blocks.columns["bias"]) <= 1e-13 * np.max(np.abs(blocks.columns["bias"])):
         raise CompensationError(f"the bias is constant ({blocks.columns['bias'][0]:g}): there is nothing to fit; check the column.")  # fmt: skip
-    return blocks
+    return AveragedRun(blocks, fine, variable)
 
 
-def rate_run(
-    blocks: Blocks, f: Array, window: float, *, causal: bool, variable: Variable, memory: Memory, start: float = 0.0
-) -> BiasRun:
+def rate_run(run: AveragedRun, f: Array, window: float, *, causal: bool, memory: Memory, start: float = 0.0) -> BiasRun:
     """Return an averaged run with its state f behind the lag of a memory, play from `start`, and the rate over `window` (s)."""
     _check_seconds("window of the rate", window)
+    blocks = run.blocks
     play = follow_play(f, memory.play, start) - f
     window = max(window, 3 * blocks.width, 2.05 * float(np.median(np.diff(blocks.time))))  # three rows, in bursts too
     derivative = differentiate(blocks.time, f, window, causal=causal)
@@ -162,7 +189,7 @@ def rate_run(
     return BiasRun(
         time=blocks.time[ok], state=f[ok], rate=derivative.slope[ok], play=play[ok],
         bias=blocks.columns["bias"][ok], width=blocks.width, window=window, lag=derivative.lag,
-        missing=blocks.missing, spikes=blocks.spikes, variable=variable, memory=memory,
+        missing=blocks.missing, spikes=blocks.spikes, variable=run.variable, memory=memory,
     )  # fmt: skip
 
 

@@ -14,6 +14,9 @@ from compensation.memory import NO_MEMORY, Memory
 from compensation.noise_regression import whiten
 
 LAGS = (20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)  # s, of a temperature, from which a search starts
+FINE = np.geomspace(
+    LAGS[0], LAGS[-1], 25
+)  # s, the same without a play: more terms behind a wrong lag may leave as little
 PLAYS = (0.02, 0.05, 0.1, 0.2)  # the same of half-widths over the span of the temperature
 REACH, ROUNDS = 2.5, 8  # times by which one search may change a number; searches, each with terms selected anew
 # Deviance that each number of a memory must gain: a chance of 0.001 by noise alone (χ² of one degree of freedom).
@@ -25,8 +28,9 @@ Prepare = Callable[[Memory], Sequence[BiasRun]]
 def choose_memory(prepare: Prepare) -> Memory:
     """Return the lag and the play behind which the fewest terms leave least, each minimised beside the terms that it selects.
 
-    m ln(SSE/m) + p ln m of whitened rows, and `WORTH` for each number of the memory. The grid is the start of four searches:
-    with a lag or without, with a play or without, which starts in its middle or where an end of the range has left it.
+    m ln(SSE/m) + p ln m of whitened rows, and `WORTH` for each number of the memory. Searches start at what leaves least
+    without a lag and with one, of loops with a play, which starts in its middle or where an end of the range has left it,
+    and at every lag without a play that leaves less than its neighbours.
     """
     plain = prepare(NO_MEMORY)
     reference, rows = float(plain[0].state[0]), sum(run.time.size for run in plain)
@@ -76,16 +80,19 @@ def choose_memory(prepare: Prepare) -> Memory:
     plays = PLAYS if rows > 2 * (len(plain) + len(POWERS)) else ()
     side = np.sign([run.state[0] - np.mean([one.state.mean() for one in plain]) for run in plain])
     loops = [Memory(0.0, part * span, tuple(side * way)) for part in plays for way in (0.0, -1.0, 1.0)]
-    grids = [
-        [NO_MEMORY],
-        loops,
-        *([replace(one, lag=lag) for one in some for lag in LAGS] for some in ([NO_MEMORY], loops)),
-    ]
-    kinds = [min(grid, key=lambda one: select(one)[0]) for grid in grids if grid]
+    grids = [loops, [replace(one, lag=lag) for one in loops for lag in LAGS]]
+    kinds = [NO_MEMORY, *_least([Memory(lag, 0.0) for lag in FINE], lambda one: select(one)[0])]
+    kinds += [min(grid, key=lambda one: select(one)[0]) for grid in grids if grid]
     for _ in range(2):  # noise is what the better memory leaves
         kinds = [search(memory) for memory in kinds]
         theta = cautious_theta(design_of(min(kinds, key=lambda one: select(one)[0])))
     return min(kinds, key=lambda one: select(one)[0])
+
+
+def _least(grid: Sequence[Memory], left: Callable[[Memory], float]) -> list[Memory]:
+    """Return the members of a grid that leave less than their neighbours."""
+    heights = np.array([np.inf, *map(left, grid), np.inf])
+    return [one for k, one in enumerate(grid) if heights[k + 1] < min(heights[k], heights[k + 2])]
 
 
 def _moved(memory: Memory, name: str, value: float) -> Memory:

@@ -19,7 +19,7 @@ from compensation.bias_selection import (
     score_path,
 )
 from compensation.errors import CompensationError
-from compensation.memory import NO_MEMORY, Memory, follow_lag
+from compensation.memory import NO_MEMORY, Memory
 from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
 from studies.models.kinds.bias import OUTPUTS, save_bias
@@ -87,12 +87,9 @@ def study_bias(
 
     @lru_cache(maxsize=4096)
     def run_of(k: int, lag: float, play: float, start: float) -> BiasRun:
-        blocks = averaged[k]
-        state = follow_lag(blocks.columns[variable.name], np.diff(blocks.time), lag)
+        run = averaged[k]
         with naming(records[k].path or "record"):
-            return rate_run(
-                blocks, state, window, causal=causal, variable=variable, memory=Memory(lag, play), start=start
-            )
+            return rate_run(run, run.behind(lag), window, causal=causal, memory=Memory(lag, play), start=start)
 
     def prepare(memory: Memory) -> list[BiasRun]:
         starts = memory.starts or (0.0,) * len(records)

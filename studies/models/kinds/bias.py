@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
-from compensation.bias import FREQUENCY, POWERS, TEMPERATURE, BiasFit, BiasRun, Variable, term_columns
+from compensation.bias import BLOCK, FREQUENCY, POWERS, TEMPERATURE, BiasFit, BiasRun, Variable, term_columns
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
 from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
@@ -24,7 +24,6 @@ from studies.models.file import Known, Model, ModelSource, Setting, make_part, w
 from studies.record import COMPENSATED, Record
 
 OUTPUTS = {"bias_deg_per_h": "deg/h", "measured_rate_deg_per_s": "deg/s"}
-BLOCK = 10.0  # s over which the frequency is averaged before it is used
 TEST_ROWS = 80  # of the emitted code
 LEAST_BLOCKS = 3  # and half a window, before a causal rate is known
 
