@@ -151,8 +151,8 @@ WAVES = (
     " {stress_ppm:+.3g} ppm by stress, {centrifugal_ppm:+.3g} by centrifugal softening and {coriolis_ppm:+.3g} by Coriolis forces."
 )
 GAS = (
-    "Pressure: {elastic_ppm:+.4g} ppm by stress, and {inertia_ppm:+.4g} ppm by the inertia of {gas} ({density_kg_m3:.4g} kg/m³) that moves with the wall, whose"
-    " sound takes 1/Q = {sound_inverse_q:.2g}. The gas is taken as free on both sides. A surface that faces the wall at a distance g, as electrodes and"
+    "Pressure: {elastic_ppm:+.4g} ppm by stress, and {inertia_ppm:+.4g} ppm by the inertia of {gas} ({density_kg_m3:.4g} kg/m³) that moves with the wall;"
+    " the sound it radiates adds 1/Q = {sound_inverse_q:.2g}. The gas is taken as free on both sides. A surface that faces the wall at a distance g, as electrodes and"
     " housing do, is not included: it multiplies the inertia on its side by about {reach_mm:.3g} mm/g and keeps the sound in."
 )
 AMPLITUDE = (
