@@ -64,6 +64,7 @@ ONE_MODE = ("detuning", "decay")
 BENT, ROUNDS, CLOSE = 4.0, 30, 1e-8  # radians by which κ turns in one go; iterations, and the change that ends them
 NODES = 6  # a radian
 MOST_TURNS = 600.0  # radians within a window, beyond which a trial point is not followed
+MOST_HALVINGS = 60  # of a window, within which κ turns far: each may be of a wave that grows
 TWO_MODES = (*ONE_MODE, "damping_cos", "damping_sin", "stiffness_cos", "stiffness_sin")
 
 
@@ -105,7 +106,7 @@ def differentiate(decay: Decay, time: Array, start: Complex) -> tuple[Complex, d
 
 
 @np.errstate(all="ignore")  # of trial points that grow
-def swing(decays: "list[Decay]", time: Array, starts: Complex) -> Complex:
+def swing(decays: "list[Decay]", time: Array, starts: Complex, halvings: int = 0) -> Complex:
     """Return z (decays, channels, rows) of decays with κ and γ from their start amplitudes (decays, channels).
 
     With e = |z|² and P = ∫e dt of z without γ, z = e^{(iδ−1/τ)t} (1+2γP)^{−½} e^{iκΦ} u, Φ = ln(1+2γP)/2γ: what all patterns share.
@@ -124,12 +125,12 @@ def swing(decays: "list[Decay]", time: Array, starts: Complex) -> Complex:
     turns = float(np.max(np.abs([s, decay + 0j, loss * energy + 0j]))) * abs(end)
     rate = np.where(decay == 0, 1e-300, 2 * decay)
     bent = float(np.max(np.abs(turn * energy * np.expm1(-rate * end) / rate)))
-    if not turns + bent < MOST_TURNS:
+    if not turns + bent < MOST_TURNS or halvings > MOST_HALVINGS:  # near the time at which it grows without limit
         return np.full((len(decays), channels, time.size), np.nan + 0j)
     if channels == 2 and bent > BENT:
         first = time[np.abs(time) < abs(end) / 2]
-        early = swing(decays, np.append(first, end / 2), starts)
-        late = swing(decays, time[first.size :] - end / 2, early[:, :, -1])
+        early = swing(decays, np.append(first, end / 2), starts, halvings + 1)
+        late = swing(decays, time[first.size :] - end / 2, early[:, :, -1], halvings + 1)
         return np.concatenate([early[:, :, :-1], late], axis=2)
 
     def waves(x: Array) -> tuple[Complex, Complex]:

@@ -26,6 +26,7 @@ from studies.errors import InputError, naming
 from studies.files.columns import Columns, read_columns, read_header
 from studies.files.given import LARGEST
 from studies.files.reading import read_bytes
+from studies.fits.misread_decay import check_phase, doubt_exchange, doubt_time
 from studies.instrument.card import Instrument
 from studies.record import CARTESIAN, DECAYS, PARTS, POLAR, POWERS, RAW
 
@@ -81,37 +82,41 @@ def read_decay(
     time = columns["time_s"]
     table.check_order("time_s", "time_s does not increase; a decay is one record in order of time.")
     reference = notes.get("reference_frequency_Hz")
-    aliased: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
     with naming(path):
         if power is not None:
-            return _told(path, notes, analyse_trace(time, np.sqrt(np.maximum(power, 0.0)), reference))
+            found = analyse_trace(time, np.sqrt(np.maximum(power, 0.0)), reference)
+            return _told(path, notes, found, doubt_time(path, found))
         raw = [columns[name] for name in RAW if name in columns]
         if raw:
             envelope, rate = mix_down(time, np.array(raw), reference), 1 / even_rows(time)[0]
             if expected is not None:
                 _refuse_alias(path, envelope.carrier, rate, expected)
             if reference is not None and reference > rate / 2:
-                aliased = (
+                doubts = (
                     f"Samples at {rate:.6g} Hz hold {reference:.6g} Hz as its alias at {alias_of(reference, rate):.6g} Hz: which it is of the"
                     " frequencies that fold there is as given, not measured.",
                 )
         else:
-            envelope = from_lock_in(time, np.array(_pairs(path, columns)), reference or 0.0)
+            names, channels = _pairs(path, columns)
+            envelope = from_lock_in(time, np.array(channels), reference or 0.0)
         if expected is not None and envelope.carrier:
             _refuse_other(path, envelope.carrier, expected)
         found = analyse_decay(envelope, harmonic=harmonic)
+        if not raw:
+            doubts = doubt_exchange(path, envelope, found, harmonic, names) + doubt_time(path, found)
         rate, line = 1 / even_rows(time)[0], found.estimates["frequency_Hz"].value
         if not raw and 2 * abs(line - envelope.carrier) > FAR * rate:
             other = line - np.copysign(rate, line - envelope.carrier)
-            aliased = (
+            doubts += (
                 f"The line is {abs(line - envelope.carrier):.3g} Hz from the reference, near half of the {rate:.3g} rows a second: it may be the alias"
                 f" of one at {other:.8g} Hz. Set the reference nearer, or record more rows a second.",
             )
-        return _told(path, notes, replace(found, remarks=(*aliased, *found.remarks)))
+        return _told(path, notes, found, doubts)
 
 
-def _told(path: str | Path, notes: Mapping[str, float], found: RingDown) -> Decay:
-    decay = Decay(**vars(found), path=str(path), notes=notes)
+def _told(path: str | Path, notes: Mapping[str, float], found: RingDown, doubts: tuple[str, ...] = ()) -> Decay:
+    decay = Decay(**vars(replace(found, remarks=(*doubts, *found.remarks))), path=str(path), notes=notes)
     if decay.frequency is not None:
         return decay
     lacking = "No reference frequency is given: frequencies are relative to it, and Q is unknown; add --frequency."
@@ -191,18 +196,24 @@ def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
     return Columns(str(path), {"time_s": rows[:, 0], "power_dBm": rows[:, 1]}, comments=tuple(comments)), notes
 
 
-def _pairs(path: str | Path, columns: Mapping[str, Array]) -> list[NDArray[np.complex128]]:
+def _pairs(
+    path: str | Path, columns: Mapping[str, Array]
+) -> tuple[list[tuple[str, str]], list[NDArray[np.complex128]]]:
+    names: list[tuple[str, str]] = []
     found: list[NDArray[np.complex128]] = []
     for first, second in (*POLAR, *CARTESIAN):
         if (first in columns) != (second in columns):
             raise InputError(f"{path}: {first} and {second} belong together; one of them is missing.")
+        if first in columns:
+            names.append((first, second))
         if first in columns and (first, second) in POLAR:
+            check_phase(path, second, columns[first], columns[second])
             found.append(np.asarray(columns[first] * np.exp(1j * np.radians(columns[second]))))
         elif first in columns:
             found.append(np.asarray(columns[first] + 1j * columns[second]))
     if len(found) > len(PARTS):
         raise InputError(f"{path}: a channel is given twice, as amplitude and phase and in two components; keep one.")
-    return found
+    return names, found
 
 
 def _refuse_alias(path: str | Path, found: float, rate: float, expected: float) -> None:

@@ -309,6 +309,17 @@ def test_limits_a_swing_with_cubic_terms_is_that_of_a_step_by_step_integration()
     assert not np.isfinite(grows).any(), "what grows without limit is not followed, and is no fault"
 
 
+@pytest.mark.slow
+def test_limits_a_wave_that_grows_without_limit_is_followed_up_to_its_pole():
+    """dE/dt = −2E/τ − 2γE² has its pole at τ/2 ln(γE/(γE + 1/τ)) where γE < −1/τ; halves of the time before it have no end."""
+    time, starts = np.linspace(0, 1, 356), np.array([[0.01 - 0.001j, -0.88 + 0.16j]])
+    E = float(np.sum(np.abs(starts) ** 2))
+    for thickening in np.linspace(-3.6, -4.0, 60):
+        z = swing([Decay(4.2, 2.8, hardening=-40.0, thickening=thickening)], time, starts)
+        pole = np.log(thickening * E / (thickening * E + 2.8)) / 2 / 2.8
+        assert np.array_equal(np.isnan(z[0, 0]), time > pole)
+
+
 def test_a_record_that_ends_within_a_block_has_lost_nothing():
     """20 050 samples are no whole number of blocks: the rest of the last one is the end of the record."""
     time = np.arange(20_050) / 1e5

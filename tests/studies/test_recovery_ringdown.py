@@ -7,6 +7,7 @@ import pytest
 
 from studies.cli import main
 from studies.errors import InputError
+from studies.fits.misread_decay import check_phase
 from studies.fits.ringdown import read_decay
 from studies.instrument.card import load_card
 from studies.record.decays import read_table
@@ -258,3 +259,72 @@ def test_a_line_near_half_of_the_rows_a_second_may_be_an_alias(tmp_path, ask):
         path = write_columns(tmp_path / "far.csv", columns, [f"reference_frequency_Hz: {4599.7 - away}"])
         (decay,) = ask(["fit", "ringdown", path])["decays"]
         assert ("may be the alias of one at 4599.69 Hz" in " ".join(decay["remarks"])) is said
+
+
+def lock_in_columns(z, polar, time=TIME):
+    columns = {"time_s": time}
+    for part, channel in zip(("cos", "sin"), z, strict=True):
+        columns |= (
+            {f"amplitude_{part}_V": np.abs(channel), f"phase_{part}_deg": np.degrees(np.angle(channel))}
+            if polar
+            else {f"in_phase_{part}_V": channel.real, f"out_of_phase_{part}_V": channel.imag}
+        )
+    return columns
+
+
+def written(tmp_path, columns, reference=4599.7):
+    return write_columns(tmp_path / "misread.csv", columns, [f"reference_frequency_Hz: {reference}"])
+
+
+@pytest.mark.parametrize("low", [-np.pi, 0.0])
+def test_contract_phases_in_rad_are_refused_with_their_factor_and_slow_ones_in_degrees_are_not(tmp_path, refuse, low):
+    """Phases in rad lie within one turn of 2π and jump by it; read in degrees they gave a split of 55 for 1.4 mHz."""
+    z = noisy(GYRO.envelope(TIME, 4599.7, [1.0, 0.8j]), 0.003, np.random.default_rng(1))
+    columns, saved = lock_in_columns(z, True), tmp_path / "saved.toml"
+    columns["phase_sin_deg"] = (np.radians(columns["phase_sin_deg"]) - low) % (2 * np.pi) + low
+    said = refuse(["fit", "ringdown", written(tmp_path, columns), "--card", "free-dome", "--save", saved])
+    assert "phase_sin_deg" in said
+    assert "in rad. Multiply the column by 57.29578" in said
+    assert not saved.exists()
+    for sd in (0.1, 1.0):  # a line on the reference: its phase stays within π degrees of 0, whatever its noise
+        still = np.clip(sd * np.random.default_rng(2).standard_normal(TIME.size), -3.1, 3.1)
+        check_phase("still.csv", "phase_cos_deg", np.exp(-TIME / 60), still)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("polar", [False, True])
+def test_contract_one_pick_off_with_its_components_exchanged_is_refused_by_its_columns(tmp_path, refuse, polar):
+    """I + iQ becomes Q + iI, a phase its negative: the line of that pick-off lies on the other side of the reference. The right file of the same gyro is the control."""
+    reference, time = 4599.69, TIME[::3]
+    z = noisy(GYRO.envelope(time, reference, [1.0, 0.8j]), 0.003, np.random.default_rng(1))
+    right = read_decay(written(tmp_path, lock_in_columns(z, polar, time), reference))
+    assert right.estimates["split_Hz"].value == pytest.approx(0.12, abs=1e-3)
+    assert not any("mirrored" in said for said in right.remarks)
+    z[1] = z[1].conj() * (1 if polar else 1j)
+    said = refuse(["fit", "ringdown", written(tmp_path, lock_in_columns(z, polar, time), reference)])
+    words = "phase_sin_deg has the opposite sign" if polar else "in_phase_sin_V and out_of_phase_sin_V, are exchanged"
+    assert words in said
+
+
+def test_contract_a_split_that_each_pick_off_sees_half_of_is_doubted_and_kept(tmp_path):
+    """Modes along the pick-offs, as far above as below the reference: both readings hold, so the split stands with a remark."""
+    gyro = Gyro(4600.0, 4599.4, 9.0e5, 1.1e6, 0.0, 0.0)
+    z = noisy(gyro.envelope(TIME, 4599.7, [1.0, 0.8j]), 0.003, np.random.default_rng(1))
+    found = read_decay(written(tmp_path, lock_in_columns(z, False)))
+    assert found.estimates["split_Hz"].value == pytest.approx(0.6, abs=1e-3)
+    assert "Doubtful" in found.remarks[0]
+
+
+@pytest.mark.parametrize(("ms", "said"), [(1000.0, "divide it by 1000"), (1.0, "")])
+def test_contract_a_q_that_no_shell_has_is_a_time_in_milliseconds(tmp_path, refuse, ms, said):
+    """Annealed fused silica has 2e8 at the most (Ageev et al. 2004), this gyro 2.7e6."""
+    gyro = Gyro(4599.75, 4599.63, 2.5e6, 2.9e6, np.radians(31), np.radians(70))
+    z = noisy(gyro.envelope(TIME, 4599.7, [1.0, 0.8j]), 0.003, np.random.default_rng(1))
+    columns = lock_in_columns(z, False)
+    path = written(tmp_path, columns | {"time_s": ms * TIME})
+    if said:
+        assert said in refuse(["fit", "ringdown", path])
+        found = read_decay(written(tmp_path, columns | {"time_s": 150.0 * TIME}))  # a record, and not impossible
+        assert any("is time_s in milliseconds?" in one for one in found.remarks)
+    else:
+        assert not any("milliseconds" in one for one in read_decay(path).remarks)
