@@ -162,12 +162,10 @@ def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float
     if np.any(np.asarray(state, dtype=np.float64) <= variable.above):
         raise CompensationError(f"a {variable.name} must be above {variable.above:g} {variable.unit}; check its unit.")
     _check_seconds("averaging", width)
-    width = max(width, float(np.median(np.diff(t)))) if t.size > 1 else width
+    step = float(np.median(np.diff(t))) if t.size > 1 else width
+    width = max(width, step)
     columns = {variable.name: state, "bias": bias}
-    blocks, fine = (
-        average_blocks(t, columns, least)
-        for least in (width, min(max(BLOCK, 0.999 * float(np.median(np.diff(t)))), width))
-    )
+    blocks, fine = (average_blocks(t, columns, one) for one in (width, min(max(BLOCK, step), width)))
     rows = blocks.time.size
     if rows < 3:
         raise CompensationError(f"averaging over {width:g} s leaves {rows} rows, but at least three are needed; record longer or average less.")  # fmt: skip

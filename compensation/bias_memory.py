@@ -14,9 +14,7 @@ from compensation.memory import NO_MEMORY, Memory
 from compensation.noise_regression import whiten
 
 LAGS = (20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)  # s, of a temperature, from which a search starts
-FINE = np.geomspace(
-    LAGS[0], LAGS[-1], 25
-)  # s, the same without a play: more terms behind a wrong lag may leave as little
+FINE = np.geomspace(20.0, 5000.0, 25)  # s, the same without a play: more terms behind a wrong lag may leave as little
 PLAYS = (0.02, 0.05, 0.1, 0.2)  # the same of half-widths over the span of the temperature
 REACH, ROUNDS = 2.5, 8  # times by which one search may change a number; searches, each with terms selected anew
 # Deviance that each number of a memory must gain: a chance of 0.001 by noise alone (χ² of one degree of freedom).
