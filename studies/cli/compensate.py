@@ -14,6 +14,8 @@ from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.instrument.units import unit_of
 from studies.record import COMPENSATED, RESONATOR, Record, read_record
+from studies.record.misread import mend_by, misreadings
+from studies.record.rest import check_record
 from studies.reports import style
 from studies.results import Drawing, Figure, Part, Result, Sentence, Table
 
@@ -22,11 +24,12 @@ WANTED = 10  # averages of a record that is too short for as many of 100 s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
 WORSE = "{} is worse than the record: the standard deviation of {:.3g} s averages increases from {:.4g} to {:.4g}. Use it only if the model is of this gyro."
 MOVING = " A model of the frequency is that of settled states: while the temperature changes, the resonator lags its thermometer."
-OPPOSITE = 0.5  # of the record's deviation: what a correction of the opposite sign leaves where the output's is changed
-SIGN = (
-    "{}: the correction of {} has the wrong sign for this record: it would increase the standard deviation of {:.3g} s averages from {:.4g}"
-    " to {:.4g}, and with the opposite sign leave {:.4g}. Correct the sign of the column, or of the temperature if the model takes one."
+EXPLAINED = 0.5  # of the record's deviation, and of what is left: what a correction in another unit leaves
+MISREAD = (
+    "{}: {} {}: the correction brings the standard deviation of {:.3g} s averages from {:.4g} to {:.4g}, and to {:.4g} once that is"
+    " mended. {}, or leave the record out if it is of another gyro."
 )
+SIGN = "Correct the sign of the column, or of the temperature if the model takes one"
 OWN_THERMOMETER = (
     "{1} has no thermometer, so {0} has the resonator's temperature, found from the frequency, instead of a compensated frequency."
     " To compensate other outputs over this temperature, use hrg fit bias --over temperature."
@@ -66,6 +69,8 @@ def compensate(
         models.emit_c(loaded)  # a formula that lacks a key is refused before a long record is read
         say(f"reading {run}")
         record = read_record(run)
+        if doubt := check_record(record):
+            say(f"warning: {doubt}")
         result = models.compensate(loaded, record, extrapolate=extrapolate)
         added = [name for name in result.columns if name not in record]
         columns = {name: _judge(record, result, name) for name in added if name.startswith(COMPENSATED)}
@@ -96,18 +101,20 @@ def _judge(record: Record, result: Record, name: str) -> dict[str, Any]:
 
 
 def _find_worse(record: Record, result: Record, columns: dict[str, dict[str, Any]]) -> list[str]:
-    """Return a sentence on each output that the model makes worse; refuse one of the opposite sign."""
+    """Return a sentence on each output that the model makes worse; refuse one of the opposite sign, or in another unit."""
     found = []
     for name, one in columns.items():
-        was, now = one["stability_before"], one["stability_after"]
-        if was is None or now is None or now <= was * (1 + NOISE):
+        was, now, output = one["stability_before"], one["stability_after"], name.removeprefix(COMPENSATED)
+        if was is None or now is None:
             continue
-        output = name.removeprefix(COMPENSATED)
-        turned = _stability(record, name, 2 * record[output] - result[name])
-        if turned is not None and turned < OPPOSITE * was:
-            raise InputError(SIGN.format(record.path, output, _width(record), was, now, turned))
-        moving = MOVING if output == "frequency_Hz" else ""
-        found.append(WORSE.format(name, _width(record), was, now) + moving)
+        for words, times in misreadings(output).items():
+            so = _stability(record, name, record[output] - (record[output] - result[name]) / times)
+            if so is not None and so < EXPLAINED * min(was, now):
+                mend = SIGN if times < 0 else mend_by(times)
+                raise InputError(MISREAD.format(record.path, output, words, _width(record), was, now, so, mend))
+        if now > was * (1 + NOISE):
+            moving = MOVING if output == "frequency_Hz" else ""
+            found.append(WORSE.format(name, _width(record), was, now) + moving)
     return found
 
 

@@ -19,12 +19,11 @@ from studies.errors import InputError, naming
 from studies.fits.scale_law import BLOCKS, SWEPT, read_law, warming_of, without_warming
 from studies.models.kinds.scale import RAW
 from studies.record import Record
+from studies.record.misread import mend_by, misreadings
 from studies.record.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
 
 STEPS = ("rough", "bias_compensated", "rate_compensated", "temperature_compensated", "filtered")
-MISREAD = {"has the opposite sign": -1.0, "is in rad/s": 180.0 / np.pi, "is in °/h": 1 / 3600}
-"""Times by which an output changes more with an applied rate that is so."""
-AS = 1.2  # times by which that may be missed: the scale over temperature, another gyro of the lot
+AS = 1.2  # times by which the factor of a misread rate may be missed: the scale over temperature, another gyro of the lot
 STEADY = 0.01  # part of the rate by which a rate table may waver and still turn at one rate
 SHORT, LONG = 1.0, 100.0  # s, at which the random walk is read: a filter of 5 s changes the first, not the second
 
@@ -219,12 +218,12 @@ def _check_applied(runs: Mapping[str, BellRun], output: str) -> None:
     }
     for path, gain in gains.items():
         others = [1.0] if output != RAW[0] else [own for other, own in gains.items() if other != path]
-        for words, times in MISREAD.items():
+        for words, times in misreadings("rate_deg_per_s").items():
             if others and 1 / AS < gain / (times * float(np.median(others)) or np.nan) < AS:
                 which = " or ".join(gains) if output == RAW[0] and len(gains) == 2 and times == -1 else path
                 raise InputError(
                     f"{which}: rate_deg_per_s {words}: {output} changes {gain / np.median(others):.4g} times as much with it as"
-                    f" {'with that of the other records' if output == RAW[0] else 'it should'}. Multiply the column by {times:.6g}."
+                    f" {'with that of the other records' if output == RAW[0] else 'it should'}. {mend_by(times)}."
                 )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from compensation.noise import white_rms
 from studies.errors import InputError
 from studies.record import Record
+from studies.record.misread import mend_by, other_units
 from studies.record.one_law import ANY_PATH, LEVELLED, Course, Followed, Law, course_of, likeliest
 from studies.record.repeated import drop_repeats
 from studies.record.rest import DRIVING, check_record, without_spikes, without_stuck
@@ -20,7 +21,6 @@ TIMES = {
     "by 1000: one is in kHz": 1e3,
     "by 2 π: one is in rad/s": 2.0 * np.pi,
 }
-UNITS = {"°/s": 3600.0, "°/day": 1 / 24, "rad/s": 3600.0 * 180.0 / np.pi, "m°/h": 1e-3}  # °/h in each
 AS_NOISE, AS_CHANGES = 2.0, 4.0  # times by which noise and changes may differ from what a unit makes of another run's
 WELL = 0.01  # of an output's changes (rms): where one law leaves no more, all runs are read alike
 CLEAR = 2.0  # times white noise (squares) that it must leave besides
@@ -99,14 +99,13 @@ def check_one_unit(records: Sequence[Record]) -> None:
         sizes.append((white * float(np.sqrt(np.median(np.diff(record["time_s"])))), changes))
     for k in range(len(records) if len(records) > 1 else 0):
         others = np.median(sizes[:k] + sizes[k + 1 :], axis=0)
-        for unit, factor in UNITS.items():
+        for unit, factor in other_units(BIAS).items():
             noise, changes = factor * np.array(sizes[k]) / np.maximum(others, 1e-300)
             if 1 / AS_NOISE < noise < AS_NOISE and 1 / AS_CHANGES < changes < AS_CHANGES:
-                times = f"{max(factor, 1 / factor):.6g}"
-                size, mend = ("less", "Multiply") if factor > 1 else ("more", "Divide")
+                times, size = f"{max(factor, 1 / factor):.6g}", "less" if factor > 1 else "more"
                 raise InputError(
                     f"{_path(records, k)}: {BIAS} scatters and changes {times} times {size} than in the other records, as in {unit}."
-                    f" {mend} the column by {times}, or leave the record out if it is of another gyro."
+                    f" {mend_by(factor)}, or leave the record out if it is of another gyro."
                 )
 
 

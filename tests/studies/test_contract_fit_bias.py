@@ -329,8 +329,31 @@ def test_a_compensation_of_the_opposite_sign_is_refused(calibrated, tmp_path, ca
     write_record(record.with_columns({"bias_deg_per_h": -record["bias_deg_per_h"]}), flipped)
     out.unlink()
     assert main(["compensate", str(calibrated / "m.toml"), str(flipped), "--out", str(out)]) == 2
-    assert "the correction of bias_deg_per_h has the wrong sign for this record" in capsys.readouterr().err
+    assert "bias_deg_per_h has the opposite sign: the correction brings" in capsys.readouterr().err
     assert not out.exists()
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1 / 3600, "°/s"), (24.0, "°/day"), (1000.0, "m°/h"), (0.3, "")])
+def test_a_model_applied_to_a_bias_in_another_unit_is_refused_with_the_factor(
+    calibrated, tmp_path, capsys, factor, unit
+):
+    """The run it was fitted to, in °/s: 'worse than the record' once, and the output written; in °/day nothing was said. A gyro of a third of the bias is no other unit."""
+    record, out, other = read_record(calibrated / "run0.csv"), tmp_path / "out.csv", tmp_path / "other.csv"
+    write_record(record.with_columns({"bias_deg_per_h": factor * record["bias_deg_per_h"]}), other)
+    status = main(["compensate", str(calibrated / "m.toml"), str(other), "--out", str(out)])
+    said = capsys.readouterr().err
+    assert (status, out.exists()) == ((2, False) if unit else (0, True))
+    mend = f"Multiply the column by {1 / factor:.6g}" if factor < 1 else f"Divide the column by {factor:.6g}"
+    assert (f"bias_deg_per_h is in {unit}:" in said and mend in said) == bool(unit)
+
+
+def test_a_record_in_hours_is_not_compensated(calibrated, tmp_path, refuse):
+    """'time' has 1 row, it said."""
+    record, hours = read_record(calibrated / "run0.csv"), tmp_path / "hours.csv"
+    warm = 20.0 + 40.0 * np.sin(record["time_s"] / 3000.0)
+    write_record(record.with_columns({"time_s": record["time_s"] / 3600.0, "housing_temperature_degC": warm}), hours)
+    said = refuse(["compensate", str(calibrated / "m.toml"), str(hours), "--out", str(tmp_path / "out.csv")])
+    assert "is it in minutes or hours" in said
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1 / 3600, "°/s"), (24.0, "°/day"), (np.pi / 648000, "rad/s")])

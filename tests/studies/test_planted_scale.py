@@ -424,7 +424,7 @@ def test_limits_the_inverse_of_a_law_gives_its_rate_back(form, s):
     [
         (0, -1.0, "rate_deg_per_s has the opposite sign: {} changes -"),
         (2, np.pi / 180, "rate_deg_per_s is in rad/s: {} changes 57."),
-        (2, 3600.0, "Multiply the column by 0.000277778."),
+        (2, 3600.0, "Divide the column by 3600."),
     ],
 )
 def test_an_applied_rate_of_another_sign_or_unit_is_named(tmp_path, refuse, k, times, said, output):
