@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from compensation.arrays import Array, Complex
 from compensation.errors import CompensationError
@@ -92,6 +92,20 @@ class StandingWave:
         """Return the wave with every physical value as an array of rows."""
         rows: dict[str, Any] = {name: np.broadcast_to(np.array(getattr(self, name), float), count) for name in PHYSICAL}
         return replace(self, **rows)
+
+    def between(self, row: NDArray[np.intp], part: Array) -> "StandingWave":
+        """Return the wave of rows at parts of the way from a row to the next: ω, 1/τ, ½ Δ(1/τ) e^{2inθ_τ} and ½ Δω e^{2inθ_ω} on straight lines."""
+        later = np.minimum(row + 1, np.size(self.omega) - 1)
+
+        def line(values: NDArray[Any]) -> NDArray[Any]:
+            return np.asarray(values[row] + part * (values[later] - values[row]))
+
+        damped, detuned = line(self.damped()), line(self.detuned())
+        return replace(
+            self, omega=line(np.asarray(self.omega)), tau=1 / line(1 / np.asarray(self.tau)),
+            damping_split=2 * np.abs(damped), damping_axis=np.angle(damped) / (2 * self.harmonic),
+            frequency_split=2 * np.abs(detuned), frequency_axis=np.angle(detuned) / (2 * self.harmonic),
+        )  # fmt: skip
 
     def at_row(self, row: int) -> "StandingWave":
         """Return the wave at one of its rows, in numbers."""

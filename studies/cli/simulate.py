@@ -19,7 +19,7 @@ from thermal.profile import parse_duration
 
 DRIVES = (
     "Further columns of the file command the drives (drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg) or"
-    " are applied (rate_deg_per_s). Or a record: its housing temperature, or else its chamber temperature, is imposed at its rows."
+    " are applied (rate_deg_per_s), between rows too: a row has the mean to the next. Or a record: its housing temperature, or else its chamber temperature, is imposed at its rows."
 )
 
 UNCERTAINTY = "Uncertainty of the prediction (standard deviation, rms over the run)"

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from compensation.applied_rate import AppliedRate
 from compensation.arrays import Array
 from compensation.decimation import bend_of_means
 from shell.constants import zero_Celsius
@@ -51,7 +52,7 @@ class Drive:
     shift: float = 0.0  # how much later than its profile says the boundary changes: the clock of a chamber
     start: float = 0.0  # since the start of the first run of the campaign
     moment: float | None = None  # s, POSIX: of the first row, where the record says it
-    rate: Array | None = None  # array (N,), rad/s, or None: That is applied, at the rows
+    rate: AppliedRate | None = None  # that is applied, rad/s
     wander: Array | float = 0.0  # array (N,), rad/s: noise of the rate, means to the next row, that turns a free wave
     source: str = ""  # file that the commands and the rate are from
     # How much later (s) single jumps of the profile are, in their order from 0: between which two rows they were is all
@@ -134,7 +135,7 @@ def drive_by_schedule(profile: Profile, columns: Mapping[str, Array], rate: floa
         for name, (column, factor, power) in COMMANDS.items()
         if column in columns
     }
-    rate_applied = np.radians(np.interp(time, profile.time, columns[RATE])) if RATE in columns else None
+    rate_applied = AppliedRate(profile.time, np.radians(columns[RATE])) if RATE in columns else None
     return Drive(time, "chamber", profile, commands=commands, rate=rate_applied)
 
 
@@ -187,9 +188,8 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     if time is not None:
         commands = {name: np.interp(time, rows, values) for name, values in commands.items()}
     turned = None
-    if record.has_values(RATE):
-        applied = _held(rows, record[RATE])
-        turned = np.radians(applied if time is None else np.interp(time, rows, applied))
+    if record.has_values(RATE):  # means to the next row
+        turned = AppliedRate.steps(rows, np.radians(_held(rows, record[RATE])))
     return Drive(
         rows if time is None else time,
         boundary,

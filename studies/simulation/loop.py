@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.actuators import Actuators, RangeUse
+from compensation.applied_rate import AppliedRate
 from compensation.arrays import Array
 from compensation.controllers import Loops, Margin, require_stable
 from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
 from compensation.rebalance import LoopRun, settle_rebalance, simulate_rebalance
-from compensation.settled_turn import read_turning, turn_settled
+from compensation.settled_turn import read_turned, turn_settled
 from compensation.wave import StandingWave
 from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
 from studies.errors import InputError, naming
@@ -92,15 +93,16 @@ def electronics_of(instrument: "Instrument", wave: StandingWave) -> Electronics:
 
 
 def find_range_use(
-    instrument: "Instrument", wave: StandingWave, rate: ArrayLike = 0.0, pattern_angle: ArrayLike | None = None
-) -> RangeUse:
-    """Return what part of the actuators' ranges the settled loops use; a free wave meets the quadrature of every azimuth."""
+    instrument: "Instrument", wave: StandingWave, rate: ArrayLike = 0.0, pattern_angle: ArrayLike | None = None,
+    effort: ArrayLike | None = None,
+) -> RangeUse:  # fmt: skip
+    """Return what part of the actuators' ranges the settled loops use; a free wave meets the quadrature, and without its `effort` (1/s) the decay, of every azimuth."""
     loop = require_loop(instrument)
     electronics = electronics_of(instrument, wave)
     angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
     if loop.mode == "whole-angle":
         turn = wave.harmonic * np.radians(loop.self_precession_deg_per_s)
-        most = 1 / np.asarray(wave.tau) + np.abs(wave.damping_split) / 2
+        most = 1 / np.asarray(wave.tau) + np.abs(wave.damping_split) / 2 if effort is None else effort
         return electronics.actuators.use(turn, np.abs(wave.frequency_split) / 2, most)
     run = settle_rebalance(wave, electronics, rate, angle)
     return electronics.actuators.use(wave.coupling * run.rate, run.quadrature, run.decay)
@@ -188,23 +190,27 @@ def settled_columns(
     pattern_angle: ArrayLike | None = None,
     damping: NDArray[np.complex128] | None = None,
     time: Array | None = None,
-    rate: ArrayLike = 0.0,
+    rate: ArrayLike | AppliedRate = 0.0,
     wander: ArrayLike = 0.0,
 ) -> dict[str, Array]:
-    """Return what the settled loops of a card record, `rate` and `wander` in rad/s, without the offset and polynomial of `[bias]`."""
+    """Return what the settled loops of a card record, `rate` and `wander` in rad/s, without the offset and polynomial of `[bias]`.
+
+    With its `time` (s), a row has the mean of the rate to the next, and that of a wave that turns freely means of all but its azimuth.
+    """
     loop, start = require_loop(instrument), float(np.radians(instrument.bias.pattern_angle_deg))
     angle = np.broadcast_to(np.asarray(start if pattern_angle is None else pattern_angle), np.shape(frequency))
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)
     electronics = electronics_of(instrument, wave)
     precession = np.radians(loop.self_precession_deg_per_s)
+    applied = rate.means(np.asarray(time)) if isinstance(rate, AppliedRate) else rate
     if loop.mode == "force-rebalance":
-        run = settle_rebalance(wave, electronics, rate, angle)
-    elif pattern_angle is None and time is not None:
+        run = settle_rebalance(wave, electronics, applied, angle)
+    elif time is None:
+        run = settle_rebalance(wave, electronics, applied, angle, precession=precession)
+    elif pattern_angle is None:
         run = turn_settled(wave, electronics, time, rate=rate, precession=precession, angle=start, wander=wander)
-    elif pattern_angle is None or time is None:
-        run = read_turning(wave, electronics, angle, rate=rate, precession=precession)
     else:  # whatever was commanded has turned it so
-        run = read_turning(wave, electronics, angle, rate=rate, time=time)
+        run = read_turned(wave, electronics, time, angle, rate=rate)
     return columns_of(loop, run)
 
 

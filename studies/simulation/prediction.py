@@ -14,7 +14,7 @@ from studies.effects import find_effect
 from studies.loss.damping_law import DampingLaw
 from studies.resonator.law import law_of
 from studies.simulation.drive import COLUMN, Drive
-from studies.simulation.response import Temperatures, check_loss, observed_rows, read_out
+from studies.simulation.response import Temperatures, observed_rows, read_out
 from studies.simulation.variations import JUMP, LAG, SHIFT, Side, Variations, slope_of_reading
 from thermal.network import Network
 from thermal.profile import Profile
@@ -75,7 +75,6 @@ def predict(
         found.value[:, 0], reading = imposed.at(drive.time), drive.profile.at(drive.time)
     columns = {COLUMN["housing"]: reading - zero_Celsius}
     columns |= read_out(instrument, law, drive, found, varied.here.lags(drive.boundary), varied.here.damping)
-    check_loss(instrument, columns["inverse_q"])
     slopes = {}
     for name in varied.names:
         along, read = partial(_still, found), np.zeros(len(drive.time))

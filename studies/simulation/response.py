@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from compensation.applied_rate import AppliedRate
 from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects import apply_effects
@@ -120,6 +121,8 @@ def read_out(
     frequency = softened + changes.get("frequency_Hz", 0.0)
     own = instrument.loss.at(warmed - reference) if damping is None else damping.inverse_q(warmed)
     inverse_q = own + changes.get("inverse_q", 0.0) + more_loss
+    if not (inverse_q > 0).all():
+        raise InputError(f"{instrument.path} [loss]: 1/Q becomes negative here; correct its slope or curvature.")
     wave = None if damping is None or damping.wave is None else damping.wave(warmed)
     change = thermal - float(law.frequency(reference))
     if instrument.polynomial is not None:
@@ -134,15 +137,14 @@ def read_out(
             change, slope, frequency, inverse_q, law.bryan_factor, pattern_angle=angle, wave=wave
         ) + changes.get("bias_deg_per_h", 0.0)
     else:
-        check_loss(instrument, inverse_q)
-        applied = 0.0 if drive.rate is None else drive.rate
+        applied = AppliedRate.of(0.0, drive.time) if drive.rate is None else drive.rate
         felt = instrument.bias.polynomial(change, slope) + changes.get("bias_deg_per_h", 0.0)
         free = instrument.loop.mode == "whole-angle"  # such a wave turns with all that feigns a rate
-        rate_felt = applied + felt / DEG_PER_H if free else applied
+        rate_felt = applied.plus(drive.time, felt / DEG_PER_H) if free else applied
         read = settled_columns(
             instrument, frequency, inverse_q, law.bryan_factor, angle, wave, drive.time, rate_felt, drive.wander
         )
-        read["bias_deg_per_h"] = read["bias_deg_per_h"] - applied * DEG_PER_H + (0.0 if free else felt)
+        read["bias_deg_per_h"] += (0.0 if free else felt) - applied.means(drive.time) * DEG_PER_H
     return {"resonator_temperature_degC": warmed - zero_Celsius, **read}
 
 
@@ -155,12 +157,6 @@ def _earlier(time: Array, value: Array, rate: Array, delay: float) -> Array:
     h = time[k + 1] - time[k]
     within = cubic((at - time[k]) / h, h, value[k], value[k + 1], rate[k], rate[k + 1])[0]
     return np.asarray(within + rate[0] * (time - delay - at))
-
-
-def check_loss(instrument: "Instrument", inverse_q: Array) -> None:
-    """Raise when 1/Q has become negative."""
-    if not (inverse_q > 0).all():
-        raise InputError(f"{instrument.path} [loss]: 1/Q becomes negative here; correct its slope or curvature.")
 
 
 def begun_in(effect: "EffectEntry", drive: Drive) -> float:

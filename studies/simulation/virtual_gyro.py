@@ -92,13 +92,13 @@ def simulate_run(
     tell("the run", 0.7)
     true = dict(prediction.columns)
     if instrument.loop is not None:
-        wave = wave_of(instrument, true["frequency_Hz"], true["inverse_q"], law.bryan_factor)
-        turned = 0.0 if drive.rate is None else drive.rate
-        use = find_range_use(instrument, wave, turned, drive.commands.get("pattern_angle"))
+        # the effort that drives a turning wave may be a brake; its actuators are made for the loss
+        loss = instrument.loss.inverse_q if free else true["inverse_q"]
+        wave = wave_of(instrument, true["frequency_Hz"], loss, law.bryan_factor)
+        turned = 0.0 if drive.rate is None else drive.rate.largest(drive.time)
+        effort = np.pi * true["frequency_Hz"] * true["inverse_q"] if free else None
+        use = find_range_use(instrument, wave, turned, drive.commands.get("pattern_angle"), effort)
         require_range(instrument, use, turned, wave.coupling, drive.source)
-    if free:  # its rate is what the azimuth does from row to row, and its other columns are means over the same time
-        for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q", "quadrature_V"):
-            true[name] = np.append((true[name][1:] + true[name][:-1]) / 2, true[name][-1])
     if not noise:
         true["housing_temperature_degC"] = prediction.housing - zero_Celsius
     columns = {"time_s": drive.time.copy()}
@@ -111,7 +111,7 @@ def simulate_run(
         if name in drive.commands:
             columns[column] = drive.commands[name] ** (1 / power) / factor
     if drive.rate is not None:
-        columns[RATE] = np.degrees(drive.rate)
+        columns[RATE] = np.degrees(drive.rate.means(drive.time))
         columns["measured_rate_deg_per_s"] = columns[RATE] + columns["bias_deg_per_h"] / 3600
     unseen = instrument.part("posterior").unseen
     for name in (*unseen, *(("measured_rate_deg_per_s",) if "bias_deg_per_h" in unseen else ())):

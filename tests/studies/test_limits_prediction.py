@@ -133,7 +133,7 @@ def test_a_command_is_held_where_its_cell_is_empty():
     holes["rate_deg_per_s"][4] = np.nan
     found = drive_by_record(Record(columns | holes))
     assert found.commands["voltage_squared"] == pytest.approx(volts**2, rel=1e-13)
-    assert found.rate == pytest.approx(np.radians(turned), rel=1e-13)
+    assert found.rate.means(time) == pytest.approx(np.radians(turned), rel=1e-13)
     assert set(found.commands) == {"voltage_squared"}
     sparse = drive_by_record(Record(columns | holes), time=np.array([5.0, 30.0, 95.0]))
     assert sparse.commands["voltage_squared"] == pytest.approx([75.0**2, 75.0**2, 125.0**2], rel=1e-13)

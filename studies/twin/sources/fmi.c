@@ -36,7 +36,7 @@ static const double starts[INPUTS] = TWIN_INPUT_STARTS;
 
 static void clear(Instance *one) {
     twin_defaults(&one->twin);
-    one->twin.noise = one->twin.held = 1;
+    one->twin.noise = 1;
     memcpy(one->in, starts, sizeof starts);
     one->seed = one->running = 0;
 }

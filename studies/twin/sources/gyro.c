@@ -149,13 +149,18 @@ const char *twin_row(Twin *w, const TwinInput *in) {
     const double applied = radians(in->given[IN_RATE] ? in->value[IN_RATE] : 0.0);
     const double straight = TWIN_BIAS_SLOPE * excess, bent = thermal - TWIN_REFERENCE_FREQUENCY - straight;
     const double felt = polynomial(p, straight + TWIN_BIAS_BEND * bent, thermal * (slope * rate[0] + uneven)) + change[TARGET_BIAS];
-    double *out = w->out, said[TWIN_SAID] = {frequency, 0.0, loss, 0.0};
+    double *out = w->out;
+#if !TWIN_FREE
+    double said[TWIN_SAID] = {frequency, 0.0, loss, 0.0};
+#endif
     w->wander = draw_wander(w, span);
 #if TWIN_FREE /* the wave turns with all that feigns a rate, noise too */
-    const double turned_by = applied + felt / DEG_PER_H, before = w->turning.rate + (w->held ? applied - w->applied : 0.0);
     const double command = radians(in->given[IN_PRECESSION] ? in->value[IN_PRECESSION] : p[P_loop_self_precession_deg_per_s]);
-    twin_turn_freely(w, frequency, loss, wave, before, turned_by, command, span, said);
-    said[1] = (said[1] - applied) * DEG_PER_H;
+    const double since = w->rates && w->row_time >= 0 ? w->applied : applied; /* since the last row */
+    double mean[TWIN_SAID];
+    twin_turn_freely(w, (TwinTurning){frequency, PI * frequency * loss, felt / DEG_PER_H, {0, 0}, {{0, 0}}}, wave, applied, command, span, mean);
+    mean[1] = (mean[1] - since) * DEG_PER_H;
+    w->said[1] = (w->said[1] - applied) * DEG_PER_H;
     out[OUT_pattern_angle_deg] = w->azimuth * 180 / PI;
 #elif TWIN_LOOPS
     const double angle = azimuth_of(w, in);
@@ -170,9 +175,6 @@ const char *twin_row(Twin *w, const TwinInput *in) {
     out[OUT_resonator_temperature_degC] = T - ZERO;
     w->applied = applied;
 #if TWIN_FREE
-    double mean[TWIN_SAID];
-    for (int k = 0; k < TWIN_SAID; ++k) mean[k] = w->row_time < 0 ? said[k] : (w->said[k] + said[k]) / 2;
-    memcpy(w->said, said, sizeof said);
     say(w, mean, span);
 #else
     say(w, said, span);

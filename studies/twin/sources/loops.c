@@ -104,11 +104,11 @@ void twin_settle_loops(Twin *w, double frequency, double loss, const double *wav
     double found[4];
     settle(w->p, &here, rate, angle, 0.0, found);
     tell(frequency, -found[1] / (HARMONIC * TWIN_BRYAN), found, said);
-    w->actuator_use = use_of(w->p, found[1], found[2], found[0]);
+    w->actuator_use = use_of(w->p, fabs(found[1]) + HARMONIC * TWIN_BRYAN * radians(w->peak), found[2], found[0]);
 }
 #else
 enum { AZIMUTHS = 2 * TWIN_TERMS, MOST_ROUNDS = 60 };
-static const double LARGEST_TURN = 0.3, SETTLED = 1e-14;
+static const double LARGEST_TURN = 0.3, STILL = 1e-3, SETTLED = 1e-14;
 
 /* Terms c_0 ... of Re sum c_j e^(2 i j psi) through values at even psi in 0 ... pi; and the sum, by Horner's rule. */
 static void terms(const double *values, Complex *c) {
@@ -146,58 +146,96 @@ static void see_channels(Twin *w) {
     w->azimuth = start + atan2(times(P[1][0], in_phase).re, times(P[0][0], in_phase).re) / HARMONIC;
 }
 
-/* What departs from the turn that rate and command would make alone, at a part of the way from one row to the next. */
-static double stray(const Twin *w, const TwinTurning *a, const TwinTurning *b, double part, double azimuth, double command) {
+/* A straight piece of the way from one row to the next: parts of it at its ends, rates (rad/s) there, what is commanded and what noise turns (rad/s). */
+typedef struct { double from, to, seconds, first, last, command, noise; } Piece;
+
+static double rate_at(const Piece *one, double part) { return one->first + (one->last - one->first) * part; }
+
+/* What the loops say at an azimuth and a part of the way: 1/tau of the drive in the place of 1/Q. */
+static void say_between(const Twin *w, const TwinTurning *a, const TwinTurning *b, double part, double rate, double azimuth, double command, double *said) {
+    const double frequency = a->frequency + (b->frequency - a->frequency) * part;
+    Wave here = wave_of(w->p, 0.0, 0.0, (const double[2]){0, 0});
+    here.decay = a->decay + (b->decay - a->decay) * part;
+    here.damped = (Complex){a->damped.re + (b->damped.re - a->damped.re) * part, a->damped.im + (b->damped.im - a->damped.im) * part};
+    double found[4];
+    settle(w->p, &here, rate, azimuth, command, found);
+    tell(frequency, (found[1] / HARMONIC - command) / TWIN_BRYAN, found, said);
+    said[2] = found[0];
+}
+
+/* What departs from the turn that rate and command would make alone, at a part of a piece. */
+static double stray(const Twin *w, const TwinTurning *a, const TwinTurning *b, const Piece *one, double part, double azimuth) {
     const Complex e = {cos(2 * HARMONIC * azimuth), sin(2 * HARMONIC * azimuth)};
-    const double feigned = series(a->drift, e) * (1 - part) + series(b->drift, e) * part;
-    return feigned + TWIN_BRYAN * series(w->turned[5], e) * (a->rate + (b->rate - a->rate) * part) + series(w->turned[6], e) * command;
+    const double way = one->from + (one->to - one->from) * part;
+    const double feigned = series(a->drift, e) * (1 - way) + series(b->drift, e) * way;
+    return feigned + TWIN_BRYAN * series(w->turned[5], e) * rate_at(one, part) + series(w->turned[6], e) * one->command;
 }
 
-static double fastest(const TwinTurning *row, double command) {
-    double speed = fabs(TWIN_BRYAN * row->rate) + fabs(command);
+static double drifting(const TwinTurning *row) {
+    double speed = 0.0;
     for (int j = 0; j < TWIN_TERMS; ++j) speed += hypot(row->drift[j].re, row->drift[j].im);
-    return 2 * HARMONIC * speed;
+    return speed;
 }
 
-/* From one row to the next: Simpson collocation, x_m = x + h/24 (5 x. + 8 x_m. - x'.), x' = x + h/6 (x. + 4 x_m. + x'.). */
-static void turn(Twin *w, const TwinTurning *a, const TwinTurning *b, double command, double span) {
-    const double pieces = fmax(ceil(fmax(fastest(a, command), fastest(b, command)) * span / LARGEST_TURN), 1.0), h = span / pieces;
+/* Along a piece in steps of Simpson collocation, x_m = x + h/24 (5 x. + 8 x_m. - x'.), x' = x + h/6 (x. + 4 x_m. + x'.); `sums` gathers
+ * what the loops say at two Gauss nodes of each step, or in the middle of one that hardly turns, times seconds. */
+static void turn(Twin *w, const TwinTurning *a, const TwinTurning *b, const Piece *one, double *sums) {
+    const double known = TWIN_BRYAN * fmax(fabs(one->first), fabs(one->last)) + fabs(one->command);
+    const double size = 2 * HARMONIC * (known + fmax(drifting(a), drifting(b))) * one->seconds;
+    const double pieces = fmax(ceil(size / LARGEST_TURN), 1.0), h = one->seconds / pieces;
     for (double k = 0; k < pieces; ++k) {
         const double from = k / pieces, middle = (k + 0.5) / pieces, to = (k + 1) / pieces, start = w->azimuth;
-        const double half = (command + TWIN_BRYAN * (a->rate + (b->rate - a->rate) * (k + 0.25) / pieces)) * h / 2;
-        const double whole = (command + TWIN_BRYAN * (a->rate + (b->rate - a->rate) * middle)) * h;
-        const double first = stray(w, a, b, from, start, command);
-        double half_way = 0.0, there = 0.0, moved = 1.0;
+        const double speed = one->command + TWIN_BRYAN * rate_at(one, from) + one->noise, more = TWIN_BRYAN * (rate_at(one, to) - rate_at(one, from));
+        const double half = h / 2 * (speed + more / 4), whole = h * (speed + more / 2), first = stray(w, a, b, one, from, start);
+        double half_way = 0.0, there = 0.0, moved = 1.0, at_middle = first, last = first;
         for (int round = 0; round < MOST_ROUNDS && moved > SETTLED; ++round) {
-            const double at_middle = stray(w, a, b, middle, start + half + half_way, command);
-            const double last = stray(w, a, b, to, start + whole + there, command), before = there;
+            const double before = there;
+            at_middle = stray(w, a, b, one, middle, start + half + half_way);
+            last = stray(w, a, b, one, to, start + whole + there);
             half_way = h / 24 * (5 * first + 8 * at_middle - last);
             there = h / 6 * (first + 4 * at_middle + last);
             moved = fabs(there - before);
+        }
+        const int nodes = size / pieces < STILL ? 1 : 2;
+        for (int node = 0; node < nodes; ++node) {
+            const double c = 0.5 + (nodes - 1) * (node - 0.5) / sqrt(3), part = from + (to - from) * c;
+            const double bend = first * (1 - 1.5 * c + 2 * c * c / 3) + at_middle * (2 * c - 4 * c * c / 3) + last * (2 * c * c / 3 - c / 2);
+            const double azimuth = start + h * c * (speed + c / 2 * more + bend);
+            double said[TWIN_SAID];
+            say_between(w, a, b, one->from + (one->to - one->from) * part, rate_at(one, part), azimuth, one->command, said);
+            for (int i = 0; i < TWIN_SAID; ++i) sums[i] += said[i] * h / nodes;
         }
         w->azimuth = start + whole + there;
     }
 }
 
-/* Whole angle: what the rows before have made of the azimuth, and what the loops say there. `before` is the rate that acted when
- * the span since the last row began, `command` the commanded turn (rad/s) since then. */
-void twin_turn_freely(Twin *w, double frequency, double loss, const double *wave, double before, double rate, double command, double span, double *said) {
-    const Wave here = wave_of(w->p, frequency, loss, wave);
+/* Whole angle: what has turned the azimuth since the last row, `mean` of what the loops said meanwhile, and in the twin what they say now. `applied` and
+ * `command` (rad/s) act since then; where the course of the rate is known, that acts and `applied` is what does now. */
+void twin_turn_freely(Twin *w, TwinTurning now, const double *wave, double applied, double command, double span, double *mean) {
+    const Wave here = wave_of(w->p, now.frequency, now.decay / (PI * now.frequency), wave);
     const double sizes[5] = {here.decay, here.damped.re, here.damped.im, here.detuned.re, here.detuned.im};
-    TwinTurning now = {rate, {{0, 0}}};
-    double found[4];
+    const TwinTurning before = w->turning;
+    double sums[TWIN_SAID] = {0};
     if (w->row_time < 0) see_channels(w);
+    now.damped = here.damped;
     for (int i = 0; i < 5; ++i)
         for (int j = 0; j < TWIN_TERMS; ++j) now.drift[j] = plus(now.drift[j], times((Complex){sizes[i], 0}, w->turned[i][j]));
-    if (w->row_time >= 0) {
-        w->turning.rate = before;
-        turn(w, &w->turning, &now, command, span);
-        w->azimuth += TWIN_BRYAN * radians(w->wander / 3600) * span;
+    for (double from = w->row_time, until; w->row_time >= 0 && from < w->time; from = until) {
+        double last = applied * 180 / PI;
+        until = w->time;
+        const double first = w->rates ? w->rates(w->course, from, &until, &last) : last;
+        Piece one = {(from - w->row_time) / span, (until - w->row_time) / span, until - from, radians(first), radians(last), command,
+                     TWIN_BRYAN * radians(w->wander / 3600)};
+        one.first += before.rate + (now.rate - before.rate) * one.from;
+        one.last += before.rate + (now.rate - before.rate) * one.to;
+        turn(w, &before, &now, &one, sums);
     }
     w->turning = now;
-    settle(w->p, &here, rate, w->azimuth, command, found);
-    tell(frequency, (found[1] / HARMONIC - command) / TWIN_BRYAN, found, said);
-    w->actuator_use = use_of(w->p, HARMONIC * command, hypot(here.detuned.re, here.detuned.im), here.decay + hypot(here.damped.re, here.damped.im));
+    say_between(w, &now, &now, 0.0, now.rate + applied, w->azimuth, command, w->said);
+    for (int i = 0; i < TWIN_SAID; ++i) mean[i] = w->row_time < 0 ? w->said[i] : sums[i] / span;
+    w->actuator_use = use_of(w->p, HARMONIC * command, hypot(here.detuned.re, here.detuned.im), mean[2]);
+    mean[2] /= PI * mean[0];
+    w->said[2] /= PI * w->said[0];
 }
 #endif
 #endif

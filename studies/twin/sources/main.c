@@ -115,20 +115,48 @@ static double value_at(Profile *profile, double time, int column) {
     return b[TIME] <= time ? b[column] : a[column] + (b[column] - a[column]) / (b[TIME] - a[TIME]) * (time - a[TIME]);
 }
 
+/* The value just after a time, and on that straight line where it bends, or at `until` where that is sooner. */
+static double line_at(Profile *profile, double from, double *until, int column, double *last) {
+    const double first = value_at(profile, from, column), *b = profile->rows[profile->place + 1], *a = b - COLUMNS;
+    if (b[TIME] > from && b[TIME] < *until) *until = b[TIME];
+    *last = first + (b[TIME] > a[TIME] ? (b[column] - a[column]) / (b[TIME] - a[TIME]) : 0.0) * (*until - from);
+    return first;
+}
+
 /* Heat from one row to the next, in pieces between which the profile is straight. */
 static const char *heat_to(Twin *twin, Profile *profile, double start, double time) {
     const char *fault = NULL;
-    double now = start;
-    while (now < time && !fault) {
-        const double from = value_at(profile, now, BOUNDARY);
-        const double *corner = profile->rows[profile->place + 1];
-        const double until = corner[TIME] > now && corner[TIME] < time ? corner[TIME] : time;
-        const double *last = corner - COLUMNS;
-        const double slope = corner[TIME] > last[TIME] ? (corner[BOUNDARY] - last[BOUNDARY]) / (corner[TIME] - last[TIME]) : 0.0;
-        fault = twin_heat(twin, until - now, from + 273.15, from + slope * (until - now) + 273.15);
-        now = until;
+    for (double now = start, until; now < time && !fault; now = until) {
+        double last;
+        until = time;
+        const double first = line_at(profile, now, &until, BOUNDARY, &last);
+        fault = twin_heat(twin, until - now, first + 273.15, last + 273.15);
     }
     return fault;
+}
+
+/* The mean of the applied rate until a time, and by how much it exceeds that meanwhile. */
+static double mean_rate(Profile *profile, double time, double end, double *peak) {
+    double sum = 0.0, most = 0.0, last = value_at(profile, time, FIRST_COMMAND);
+    const double now = last;
+    for (double from = time, until; from < end; from = until) {
+        until = end;
+        const double first = line_at(profile, from, &until, FIRST_COMMAND, &last);
+        most = fmax(most, fmax(fabs(first), fabs(last)));
+        sum += (until - from) * (first + last) / 2;
+    }
+    const double mean = end > time ? sum / (end - time) : now;
+    *peak = fmax(most - fabs(mean), 0.0);
+    return mean;
+}
+
+static double rates(void *course, double from, double *until, double *last) {
+    Profile *profile = course;
+    const double start = profile->rows[0][TIME];
+    double end = start + *until;
+    const double first = line_at(profile, start + from, &end, FIRST_COMMAND, last);
+    if (end < start + *until) *until = fmax(end - start, nextafter(from, INFINITY));
+    return first;
 }
 
 static const char *onward(Twin *twin, const void *way, double seconds) {
@@ -171,8 +199,10 @@ static int write_rows(Twin *twin, Profile *profile, FILE *out, double row, int f
     Row here = {0};
     double now = start;
     twin->step = row;
+    Profile along = *profile, ahead = *profile; /* of the rate, each with its own place */
     twin->onward = onward;
     twin->way = profile;
+    if (profile->has[FIRST_COMMAND]) twin->rates = rates, twin->course = &along;
     fprintf(out, "# instrument: %s\n# source: simulated\n", TWIN_NAME);
     if (*profile->start) fprintf(out, "# start: %s\n", profile->start);
     fprintf(out, "time_s%s", TWIN_SENSOR >= 0 ? "," TWIN_BOUNDARY : "");
@@ -192,6 +222,7 @@ static int write_rows(Twin *twin, Profile *profile, FILE *out, double row, int f
             in.given[c] = profile->has[FIRST_COMMAND + c];
             in.value[c] = value_at(profile, time, FIRST_COMMAND + c);
         }
+        in.value[IN_RATE] = mean_rate(&ahead, time, n + 1 < count ? fmin(start + (double)(n + 1) * row, end) : time, &twin->peak);
         const double boundary = value_at(profile, time, BOUNDARY);
         if (n == 0) twin->boundary = boundary + 273.15;
         if (!fault) fault = twin_row(twin, &in);

@@ -32,7 +32,8 @@ typedef struct { double flicker[FLICKER_TIMES], walk, offset, markov; int begun;
 typedef struct { double white, flicker, walk, offset, markov, markov_time; } TwinLevels;
 
 typedef struct { double re, im; } TwinComplex;
-typedef struct { double rate; TwinComplex drift[TWIN_TERMS]; } TwinTurning; /* at a row: rad/s, and the turn that azimuths feign */
+/* At a row: Hz, 1/tau and D(1/tau)/2 with its axis (1/s), the rate that is feigned and the turn that azimuths feign (rad/s). */
+typedef struct { double frequency, decay, rate; TwinComplex damped, drift[TWIN_TERMS]; } TwinTurning;
 
 typedef struct Twin {
     double p[TWIN_PARAMETERS];
@@ -54,11 +55,14 @@ typedef struct Twin {
     TwinNoise of_frequency, of_bias;
     double wander; /* noise of the zero-rate output since the last row, deg/h */
     /* Of a wave that turns freely: its measured azimuth (rad), what turns it, what its channels make of that; what was said of the
-     * last row; whether an input is held from a row to the next, or a straight line. */
+     * last row, and means since the one before. */
     double azimuth, said[TWIN_SAID], applied;
     TwinTurning turning;
     TwinComplex turned[TWIN_TURNERS][TWIN_TERMS];
-    int held;
+    double peak; /* deg/s: by how much the applied rate exceeds its input, a mean, until the next row */
+    /* the applied rate (deg/s) from a moment until it bends, and where it does; where it is not known the input has acted since the last row */
+    double (*rates)(void *course, double from, double *until, double *last);
+    void *course;
     /* heats by seconds along what the boundary will do, where that is known; else it goes straight on */
     const char *(*onward)(struct Twin *, const void *way, double seconds);
     const void *way;
@@ -90,7 +94,7 @@ void twin_last_row(Twin *twin); /* the outputs at this moment itself: those of a
 /* Of the parts. */
 double twin_effect(Twin *twin, const TwinEffect *effect, const TwinInput *in, double h, double housing, double resonator, double rate);
 #if TWIN_FREE
-void twin_turn_freely(Twin *w, double frequency, double loss, const double *wave, double before, double rate, double command, double span, double *said);
+void twin_turn_freely(Twin *w, TwinTurning now, const double *wave, double applied, double command, double span, double *mean);
 #elif TWIN_LOOPS
 void twin_settle_loops(Twin *twin, double frequency, double loss, const double *wave, double rate, double angle, double *said);
 #endif

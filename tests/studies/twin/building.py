@@ -54,9 +54,6 @@ def simulated(instrument, profile, row=1.0):
     driven = profile if isinstance(profile, Profile) else load_drive(str(profile), rate=1 / row)
     run = simulate_run(instrument, driven, 1 / row, noise=False)
     columns = dict(run.prediction.columns)
-    if instrument.loop is not None and instrument.loop.mode == "whole-angle":  # means from a row to the next
-        for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q", "quadrature_V"):
-            columns[name] = np.append((columns[name][1:] + columns[name][:-1]) / 2, columns[name][-1])
     if run.prediction.drive.boundary == "chamber":
         columns["housing_temperature_degC"] = run.prediction.housing - zero_Celsius
     return columns

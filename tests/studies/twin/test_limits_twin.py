@@ -173,7 +173,9 @@ def test_limits_wave_that_turns_freely(precession, control, folder):
     program = compile_twin(instrument, folder / "free")
     ten = TEN_HOURS | {"time_s": [0.0, 600.0, *TEN_HOURS["time_s"][2:]]}
     rate = {"rate_deg_per_s": [0.0, 0.01, -0.01, 0.02, 0.0]}
-    for columns, row in ((ten | rate, 12.0), ({k: RAMPS[k] for k in (*ten, *rate)}, 4.0)):
+    pulses = {"time_s": [0.0, 33.3, 33.300001, 38.0, 38.1, 600.0], "chamber_temperature_degC": [20.0] * 5 + [25.0]}
+    pulses |= {"rate_deg_per_s": [0.0, 0.0, 10.0, 10.0, 0.0, -0.1]}  # inside a row
+    for columns, row in ((ten | rate, 12.0), ({k: RAMPS[k] for k in (*ten, *rate)}, 4.0), (pulses, 10.0)):
         profile = write_profile(folder / "free.csv", columns)
         found, expected = run_twin(program, profile, row), simulated(instrument, profile, row)
         assert np.ptp(expected["pattern_angle_deg"]) > 0.9 * abs(precession) * columns["time_s"][-1]
