@@ -53,6 +53,8 @@ class Drive:
     start: float = 0.0  # since the start of the first run of the campaign
     moment: float | None = None  # s, POSIX: of the first row, where the record says it
     rate: AppliedRate | None = None  # that is applied, rad/s
+    # whether a row has the mean of the rate, and of what a free wave shows, to the next; else what is at its moment
+    means: bool = False
     wander: Array | float = 0.0  # array (N,), rad/s: noise of the rate, means to the next row, that turns a free wave
     source: str = ""  # file that the commands and the rate are from
     # How much later (s) single jumps of the profile are, in their order from 0: between which two rows they were is all
@@ -66,6 +68,13 @@ class Drive:
         for name in self.initial:
             if name not in self.departing:
                 raise InputError(f"a drive by the {self.boundary} has no '{name}'; it has {', '.join(self.departing)}.")
+
+    @property
+    def applied(self) -> Array:
+        """Return the rate of the rows, rad/s."""
+        if self.rate is None:
+            return np.zeros(len(self.time))
+        return self.rate.means(self.time) if self.means else self.rate.at(self.time)
 
     @property
     def lumps(self) -> tuple[str, ...]:

@@ -192,25 +192,31 @@ def settled_columns(
     time: Array | None = None,
     rate: ArrayLike | AppliedRate = 0.0,
     wander: ArrayLike = 0.0,
+    means: bool = False,
 ) -> dict[str, Array]:
     """Return what the settled loops of a card record, `rate` and `wander` in rad/s, without the offset and polynomial of `[bias]`.
 
-    With its `time` (s), a row has the mean of the rate to the next, and that of a wave that turns freely means of all but its azimuth.
+    With `means`, a row of a wave that turns freely over the `time` (s) has the azimuth of its moment and means to the next.
     """
     loop, start = require_loop(instrument), float(np.radians(instrument.bias.pattern_angle_deg))
     angle = np.broadcast_to(np.asarray(start if pattern_angle is None else pattern_angle), np.shape(frequency))
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)
     electronics = electronics_of(instrument, wave)
     precession = np.radians(loop.self_precession_deg_per_s)
-    applied = rate.means(np.asarray(time)) if isinstance(rate, AppliedRate) else rate
+    applied = rate.at(np.asarray(time)) if isinstance(rate, AppliedRate) else rate
     if loop.mode == "force-rebalance":
         run = settle_rebalance(wave, electronics, applied, angle)
-    elif time is None:
-        run = settle_rebalance(wave, electronics, applied, angle, precession=precession)
-    elif pattern_angle is None:
-        run = turn_settled(wave, electronics, time, rate=rate, precession=precession, angle=start, wander=wander)
-    else:  # whatever was commanded has turned it so
-        run = read_turned(wave, electronics, time, angle, rate=rate)
+    elif time is not None and pattern_angle is not None:  # whatever was commanded has turned it so
+        if means:
+            run = read_turned(wave, electronics, time, angle, rate=rate)
+        else:
+            run = settle_rebalance(wave, electronics, applied, angle, np.gradient(angle, time))
+    else:
+        if time is not None and pattern_angle is None:
+            run = turn_settled(wave, electronics, time, rate=rate, precession=precession, angle=start, wander=wander)
+            angle = run.angle
+        if time is None or not means:
+            run = settle_rebalance(wave, electronics, applied, angle, precession=precession)
     return columns_of(loop, run)
 
 

@@ -137,14 +137,14 @@ def read_out(
             change, slope, frequency, inverse_q, law.bryan_factor, pattern_angle=angle, wave=wave
         ) + changes.get("bias_deg_per_h", 0.0)
     else:
-        applied = AppliedRate.of(0.0, drive.time) if drive.rate is None else drive.rate
         felt = instrument.bias.polynomial(change, slope) + changes.get("bias_deg_per_h", 0.0)
         free = instrument.loop.mode == "whole-angle"  # such a wave turns with all that feigns a rate
-        rate_felt = applied.plus(drive.time, felt / DEG_PER_H) if free else applied
+        applied, turning = drive.applied, drive.rate or AppliedRate.of(0.0, drive.time)
         read = settled_columns(
-            instrument, frequency, inverse_q, law.bryan_factor, angle, wave, drive.time, rate_felt, drive.wander
-        )
-        read["bias_deg_per_h"] += (0.0 if free else felt) - applied.means(drive.time) * DEG_PER_H
+            instrument, frequency, inverse_q, law.bryan_factor, angle, wave, drive.time,
+            turning.plus(drive.time, felt / DEG_PER_H) if free else applied, drive.wander, drive.means,
+        )  # fmt: skip
+        read["bias_deg_per_h"] += (0.0 if free else felt) - applied * DEG_PER_H
     return {"resonator_temperature_degC": warmed - zero_Celsius, **read}
 
 

@@ -75,6 +75,7 @@ def simulate_run(
 ) -> VirtualRun:
     """Run a virtual gyro through chamber temperatures (K), settled at the first, or a drive with its own rows; `rate`: rows per second."""
     drive = driven if isinstance(driven, Drive) else drive_by_profile(driven, rows_of(driven, rate))
+    drive = replace(drive, means=True)
     if isinstance(driven, Drive):
         rate = 1 / float(np.median(np.diff(drive.time)))
     check_profile(drive.profile, instrument)
@@ -111,7 +112,7 @@ def simulate_run(
         if name in drive.commands:
             columns[column] = drive.commands[name] ** (1 / power) / factor
     if drive.rate is not None:
-        columns[RATE] = np.degrees(drive.rate.means(drive.time))
+        columns[RATE] = np.degrees(drive.applied)
         columns["measured_rate_deg_per_s"] = columns[RATE] + columns["bias_deg_per_h"] / 3600
     unseen = instrument.part("posterior").unseen
     for name in (*unseen, *(("measured_rate_deg_per_s",) if "bias_deg_per_h" in unseen else ())):
