@@ -1,9 +1,9 @@
 """Laws from many decays of one resonator: frequency and 1/Q over temperature, pressure, amplitude and time.
 
-    ln f = c + α T + h a² (+ β t) (+ a step between sessions),      1/Q = 1/Q₀ + s p + q T + g a² (+ β t) (+ steps)
+    ln f = c + α T + h a² (+ b T²) (+ β t) (+ a step between sessions),      1/Q = 1/Q₀ + s p + q T + g a² (+ b T²) (+ β t) (+ steps)
 
 p is free-molecular gas, which takes momentum in proportion to its pressure; √p takes its place where viscous gas fits better.
-A pendulum has h = −1/16 of its angle, a cubic stiffness any h. Time comes in where it pays: as ageing, as steps, or both.
+A pendulum has h = −1/16 of its angle, a cubic stiffness any h. Bend and time come in where they pay: time as ageing, as steps, or both.
 
 Rows scatter by more than their own errors, those of one decay together, neighbouring decays together, and so do readings at the
 same place of every decay (a counter, a launch). The covariance is that of sums over decays and over places, each with the
@@ -124,18 +124,26 @@ def _add_what_pays(rows: Rows, columns: dict[str, Array], begins: tuple[float, .
         rival = columns | {"pressure": np.sqrt(pressure)}
         if _gain(rows, columns, rival, loss) > 0:
             columns = {"root pressure" if name == "pressure" else name: x for name, x in rival.items()}
-    more: list[dict[str, Array]] = []
-    if loss and "temperature" in columns and np.ptp(columns["temperature"]) > BEND:
-        more.append({"temperature squared": columns["temperature"] ** 2})
+    bend: list[dict[str, Array]] = []
+    course: list[dict[str, Array]] = []  # of which one is taken
+    if "temperature" in columns and (not loss or np.ptp(columns["temperature"]) > BEND):
+        bend.append({"temperature squared": columns["temperature"] ** 2})
     if np.ptp(rows.time) > 0:
-        more.append({"time": (rows.time - rows.time.min()) / DAY})
+        course.append({"time": (rows.time - rows.time.min()) / DAY})
     if begins:
         steps = {f"step {k}": np.where(rows.time >= begin, 1.0, 0.0) for k, begin in enumerate(begins, 1)}
         session = np.searchsorted(begins, rows.time, side="right")
         means = np.bincount(session, rows.time) / np.bincount(session)
-        more += [steps, steps | {"time within sessions": (rows.time - means[session]) / DAY}]
-    gains = [_gain(rows, columns, columns | one, loss) for one in more]
-    return columns | more[int(np.argmax(gains))] if gains and max(gains) > 0 else columns
+        course += [steps, steps | {"time within sessions": (rows.time - means[session]) / DAY}]
+    while rivals := [
+        (_gain(rows, columns, columns | one, loss), k, kind) for kind in (bend, course) for k, one in enumerate(kind)
+    ]:
+        gain, k, kind = max(rivals, key=lambda one: one[0])
+        if gain <= 0:
+            break
+        columns = columns | kind[k]
+        kind.clear()
+    return columns
 
 
 def _gain(rows: Rows, columns: Mapping[str, Array], rival: Mapping[str, Array], loss: bool) -> float:
