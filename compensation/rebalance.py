@@ -14,9 +14,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from compensation.actuators import require_range
+from compensation.applied_rate import AppliedRate
 from compensation.arrays import Array
 from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, require_stable
@@ -48,56 +49,85 @@ class LoopRun:
 
 
 def simulate_rebalance(
-    wave: StandingWave, electronics: Electronics, loops: Loops, time: ArrayLike, *, rate: ArrayLike = 0.0,
+    wave: StandingWave, electronics: Electronics, loops: Loops, time: ArrayLike, *, rate: ArrayLike | AppliedRate = 0.0,
     angle: ArrayLike = 0.0, generator: np.random.Generator | None = None,
     progress: Callable[[float], None] = lambda part: None,
 ) -> LoopRun:  # fmt: skip
-    """Run a gyro in force-to-rebalance mode, settled where the commanded `angle` (rad) changes; `rate` (rad/s) is linear between rows."""
+    """Run a gyro in force-to-rebalance mode, settled where the commanded `angle` (rad) changes; `rate` (rad/s) of rows is linear between."""
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)
     require_stable(loops, float(np.max(1 / np.asarray(wave.tau))))
-    rows = wave.over_rows(len(t))
-    turning, azimuth = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (rate, angle))
-    forcing = np.empty((len(t), 4))
+    cut = cut_rows(wave.over_rows(len(t)), t, samples, loops, rate)
+    rows, count = cut.rows, len(cut.row)
+    azimuth = np.broadcast_to(np.asarray(angle, dtype=float), t.shape)[cut.row]
+    forcing = np.empty((count, 4))
     start = float(rows.omega[0] + rows.detuning(azimuth)[0])  # type: ignore[index]
     forcing[:, 0] = -rows.decay(azimuth)
     forcing[:, 1] = rows.omega + rows.detuning(azimuth) - start
-    forcing[:, 2] = rows.coupling * (turning + rows.drift(azimuth))
+    forcing[:, 2] = rows.coupling * (cut.begin + rows.drift(azimuth))
     forcing[:, 3] = -rows.quadrature(azimuth)
-    commands = np.empty((len(t), 4))
-    state, limits, limited = None, electronics.actuators, 0
-    for block in _alike(rows, turning, azimuth):
+    later = np.minimum(np.arange(count) + 1, count - 1)
+    later = np.where(azimuth[later] == azimuth, later, np.arange(count))
+    ends = forcing[later]
+    ends[:, 2] += rows.coupling * (cut.end - cut.begin[later])
+    sums, at_limit = np.empty((count, 4)), np.zeros(count, dtype=bool)
+    state, limits = None, electronics.actuators
+    for block in _alike(rows, cut.begin, azimuth):
         middle = (block.start + block.stop) // 2
         here = rows.at_row(middle)
-        loop, offset = close_loops(here, electronics, loops, float(turning[middle]), float(azimuth[middle]))
+        loop, offset = close_loops(here, electronics, loops, float(cut.begin[middle]), float(azimuth[middle]))
         if block.start == 0 or azimuth[block.start] != azimuth[block.start - 1]:
             loop.require_stable()
             state = loop.settle(forcing[block.start], offset)
             held = state[loop.places["sent"]][:4]
-            require_range(limits.use(held[2], held[3], held[0]), f"at {t[block.start]:g} s")
+            require_range(limits.use(held[2], held[3], held[0]), f"at {t[cut.row[block.start]]:g} s")
         assert state is not None
-        row, at = loop.row(samples), loop.places
+        maps, at = {size: loop.row(size) for size in set(cut.samples[block].tolist())}, loop.places
         draws = generator.standard_normal((block.stop - block.start, loop.size)) if generator is not None else None
         for n in range(block.start, block.stop):
             if n % TELL == 0:
-                progress(n / len(t))
-            later = min(n + 1, len(t) - 1)
-            end = forcing[later] if azimuth[later] == azimuth[n] else forcing[n]
-            begun = row.start(state, (forcing[n], end), (offset, offset), samples * loops.step)
-            state = row.map @ begun
+                progress(n / count)
+            size = int(cut.samples[n])
+            begun = maps[size].start(state, (forcing[n], ends[n]), (offset, offset), size * loops.step)
+            state = maps[size].map @ begun
             if draws is not None:
-                state += row.root @ draws[n - block.start]
-            if limits.finite and limits.is_near(np.array([state[at["sum"]] / samples, state[at["sent"]][:4]])):
-                state, at_limit = loop.follow(begun, samples, generator)
-                limited += at_limit
-                if at_limit and abs(state[at["wave"]][2]) > LOST:
+                state += maps[size].root @ draws[n - block.start]
+            if limits.finite and limits.is_near(np.array([state[at["sum"]] / size, state[at["sent"]][:4]])):
+                state, at_limit[n] = loop.follow(begun, size, generator)
+                if at_limit[n] and abs(state[at["wave"]][2]) > LOST:
                     raise CompensationError(
-                        f"at {t[n]:g} s control of the wave is lost: the force is at its limit and cannot balance a rate of"
-                        f" {np.degrees(turning[n]):.4g} °/s; lower the rate or its duration, or raise the range."
+                        f"at {t[cut.row[n]]:g} s control of the wave is lost: the force is at its limit and cannot balance a rate of"
+                        f" {np.degrees(max(cut.begin[n], cut.end[n], key=abs)):.4g} °/s; lower the rate or its duration, or raise the range."
                     )
-            commands[n] = state[at["sum"]] / samples
+            sums[n] = state[at["sum"]]
+    commands = np.add.reduceat(sums, cut.first) / samples
+    limited = int(np.logical_or.reduceat(at_limit, cut.first).sum())
     rate_said = -commands[:, 2] / rows.coupling
-    return LoopRun(t, rate_said, commands[:, 3], commands[:, 0], start - commands[:, 1], azimuth.copy(), limited)
+    return LoopRun(t, rate_said, commands[:, 3], commands[:, 0], start - commands[:, 1], azimuth[cut.first], limited)
+
+
+@dataclass(frozen=True)
+class CutRows:
+    """Rows of a run cut where the applied rate bends: the wave and the rate (rad/s) where pieces begin, the rate where they end, their rows and samples."""
+
+    rows: StandingWave
+    begin: Array
+    end: Array
+    row: NDArray[np.intp]
+    part: Array  # of the row, before the piece
+    samples: NDArray[np.intp]
+
+    @property
+    def first(self) -> NDArray[np.intp]:
+        """The pieces with which rows begin."""
+        return np.flatnonzero(np.diff(self.row, prepend=-1))
+
+
+def cut_rows(rows: StandingWave, time: Array, samples: int, loops: Loops, rate: ArrayLike | AppliedRate) -> CutRows:
+    """Cut rows of so many samples of the loops."""
+    edges, begin, end = AppliedRate.of(rate, time).in_samples(len(time), samples, float(time[0]), loops.step)
+    row, part = edges[:-1] // samples, edges[:-1] % samples / samples
+    return CutRows(rows if len(row) == len(time) else rows.between(row, part), begin, end, row, part, np.diff(edges))
 
 
 def settle_rebalance(

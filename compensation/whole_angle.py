@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.actuators import require_range
+from compensation.applied_rate import AppliedRate
 from compensation.arrays import Array
 from compensation.closed_loop import ClosedLoop, RowMap
 from compensation.controllers import Loops, require_stable
 from compensation.electronics import Electronics
-from compensation.rebalance import TELL, LoopRun, samples_in_row, settle_rebalance
+from compensation.rebalance import TELL, CutRows, LoopRun, cut_rows, samples_in_row, settle_rebalance
 from compensation.wave import StandingWave
 
 TURN = 0.1  # largest turn of 2ψ (rad) in one step
@@ -29,7 +30,7 @@ WITHOUT_RATE = ("amplitude", "phase", "quadrature")
 
 
 def simulate_whole_angle(
-    wave: StandingWave, electronics: Electronics, loops: Loops, time: ArrayLike, *, rate: ArrayLike = 0.0,
+    wave: StandingWave, electronics: Electronics, loops: Loops, time: ArrayLike, *, rate: ArrayLike | AppliedRate = 0.0,
     precession: ArrayLike = 0.0, angle: float = 0.0, generator: np.random.Generator | None = None,
     progress: Callable[[float], None] = lambda part: None,
 ) -> LoopRun:  # fmt: skip
@@ -37,16 +38,16 @@ def simulate_whole_angle(
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)
     require_stable(loops, float(np.max(1 / np.asarray(wave.tau))), WITHOUT_RATE)
-    rows = wave.over_rows(len(t))
-    turning, commanded = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (rate, precession))
-    course = _Course(rows, electronics, turning, commanded * rows.harmonic)
+    cut = cut_rows(wave.over_rows(len(t)), t, samples, loops, rate)
+    rows, commanded = cut.rows, np.broadcast_to(np.asarray(precession, dtype=float), t.shape)
+    course = _Course(cut, electronics, np.interp(cut.row + cut.part, np.arange(len(t)), commanded) * rows.harmonic)
     loop = close_without_rate(wave, electronics, loops)
     loop.require_stable()
     maps: dict[int, RowMap] = {}
     h = samples * loops.step
     angle, offset = electronics.shown(rows.harmonic, angle), np.zeros(4)
     psi = rows.harmonic * angle
-    settled = settle_rebalance(rows.at_row(0), electronics, turning[0], angle, precession=commanded[0])
+    settled = settle_rebalance(rows.at_row(0), electronics, cut.begin[0], angle, precession=commanded[0])
     means = (
         1.0 + 0j,
         0j,
@@ -58,19 +59,20 @@ def simulate_whole_angle(
     at = loop.places
     noise = electronics.noise
     readout = math.sqrt(noise.measurement_variance(loops.sampling) * loops.smoothing / (2 - loops.smoothing))
-    commands, measured = np.empty((len(t), 4)), np.empty(len(t))
-    for n in range(len(t)):
+    totals, measured = np.zeros((len(cut.row), 4)), np.empty(len(cut.row))
+    for n in range(len(cut.row)):
         if n % TELL == 0:
-            progress(n / len(t))
-        measured[n] = psi + (generator.normal(0, readout) if generator is not None else 0.0)
-        pieces = min(samples, math.ceil(2 * abs(course.turn(n, 0.0, psi, means)) * h / TURN) or 1)
-        total = np.zeros(4)
+            progress(n / len(cut.row))
+        if cut.part[n] == 0:
+            measured[n] = psi + (generator.normal(0, readout) if generator is not None else 0.0)
+        size = int(cut.samples[n])
+        pieces = min(size, math.ceil(2 * abs(course.turn(n, 0.0, psi, means)) * size * loops.step / TURN) or 1)
         for piece in range(pieces):
-            done, part = piece * samples // pieces, (piece + 1) * samples // pieces - piece * samples // pieces
+            done, part = piece * size // pieces, (piece + 1) * size // pieces - piece * size // pieces
             if part not in maps:
                 maps[part] = loop.row(part)
             row, step = maps[part], part * loops.step
-            begin, end = done / samples, (done + part) / samples
+            begin, end = done / size, (done + part) / size
             shake = row.root @ generator.standard_normal(loop.size) if generator is not None else 0.0
             psi_end = psi + step * course.turn(n, begin, psi, means)
             for _ in range(2):
@@ -93,12 +95,13 @@ def simulate_whole_angle(
                 pushed = math.sqrt(noise.command_variance(loops.sampling) * step / loops.sampling)
                 psi_end += pushed * generator.standard_normal()
             psi, state = psi_end, new
-            total += new[at["sum"]]
-        commands[n] = total / samples
-    use = electronics.actuators.use(course.command, commands[:, 3], commands[:, 0])
+            totals[n] += new[at["sum"]]
+    commands = np.add.reduceat(totals, cut.first) / samples
+    across = commanded * rows.harmonic
+    use = electronics.actuators.use(across, commands[:, 3], commands[:, 0])
     worst = int(np.argmax(np.max([use.across, use.quadrature, use.drive], axis=0)))
-    require_range(electronics.actuators.use(course.command[worst], *commands[worst, [3, 0]]), f"at {t[worst]:g} s")
-    theta = measured / rows.harmonic
+    require_range(electronics.actuators.use(across[worst], *commands[worst, [3, 0]]), f"at {t[worst]:g} s")
+    theta = measured[cut.first] / rows.harmonic
     turned = np.diff(np.append(theta, psi / rows.harmonic)) / h
     indicated = (turned - (commanded + np.append(commanded[1:], commanded[-1])) / 2) / rows.bryan_factor
     return LoopRun(t, indicated, commands[:, 3], commands[:, 0], course.start - commands[:, 1], theta)
@@ -113,21 +116,22 @@ def close_without_rate(wave: StandingWave, electronics: Electronics, loops: Loop
 
 @dataclass
 class _Course:
-    """What the turning wave meets, at a fraction of a row and an angle ψ of the plane."""
+    """What the turning wave meets, at a fraction of a piece of a row and an angle ψ of the plane."""
 
-    rows: StandingWave
+    cut: CutRows
     electronics: Electronics
-    rate: Array
     command: Array
 
     def __post_init__(self) -> None:
-        rows = self.rows
+        rows = self.cut.rows
         self.start = float(rows.at_row(0).omega)
         growth = 1j * (np.asarray(rows.omega) - self.start) - 1 / np.asarray(rows.tau)
         damped, detuned = rows.damped(), rows.detuned()
         even, odd = 1j * detuned.real - damped.real, 1j * detuned.imag - damped.imag
-        self.columns = np.stack([growth, rows.coupling * self.rate, self.command, even, odd], axis=1).tolist()
-        self.columns.append(self.columns[-1])
+        columns = np.stack([growth, rows.coupling * self.cut.begin, self.command, even, odd], axis=1)
+        ends = np.concatenate([columns[1:], columns[-1:]])
+        ends[:, 1] = rows.coupling * self.cut.end
+        self.columns, self.ends = columns.tolist(), ends.tolist()
         pickoff, drive = self.electronics.channels(rows.harmonic)
         back = np.linalg.inv(pickoff)
         J, S_even, S_odd = np.array([[0, -1], [1, 0]]), np.diag([1, -1]), np.array([[0, 1], [1, 0]])
@@ -140,7 +144,7 @@ class _Course:
         """Growth of antinode and node as the pick-offs show them, C_p (A C_p⁻¹ (P, S) + C_d c), in the frame of ψ."""
         now = self.columns[row]
         if fraction:
-            now = [a + fraction * (b - a) for a, b in zip(now, self.columns[row + 1], strict=True)]
+            now = [a + fraction * (b - a) for a, b in zip(now, self.ends[row], strict=True)]
         P, S, amplitude, phase, quadrature = means
         grown, coriolis, command, even, odd = now
         c, s = math.cos(psi), math.sin(psi)

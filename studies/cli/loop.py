@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from compensation.applied_rate import AppliedRate
 from compensation.controllers import Loops
 from shell.constants import zero_Celsius
 from studies.cli.arguments import POSITIVE, Card, Seed, Temperature, open_card
@@ -52,7 +53,7 @@ def loop(
         hours: Length of the run; 1 unless --hours or --profile is given.
         row: Time between rows of the run in s; 1 unless given.
         profile: Chamber profile of the run, in words or as a file with time_s, chamber_temperature_degC and optionally
-            rate_deg_per_s, which is applied; frequency and loss follow the temperature.
+            rate_deg_per_s, which is applied between rows too; frequency and loss follow the temperature.
         both_ways: Reverse the self-precession halfway through the run (whole-angle cards only).
         noiseless: Run without noise.
     """
@@ -132,7 +133,7 @@ def _run(
     study: LoopStudy, temperature: float, out: str, hours: float, row: float, rate: float, profile: str | None,
     both_ways: bool, seed: int | None,
 ) -> Record:  # fmt: skip
-    instrument, damping, applied = study.instrument, None, np.asarray(rate)
+    instrument, damping, applied = study.instrument, None, None
     f, loss = np.array(study.frequency), np.array(study.inverse_q)
     if profile is not None:
         chamber, commands = load_schedule(profile)
@@ -148,21 +149,22 @@ def _run(
         law = damping_law(instrument, float(T.min()), float(T.max()))
         damping = law.wave(T) if law is not None and law.wave is not None else None
         if commands:
-            turning = np.radians(applied := np.interp(time, chamber.time, commands[RATE]))
-            use = find_range_use(instrument, study.wave, turning)
-            require_range(instrument, use, turning, study.wave.coupling, profile)
+            applied = AppliedRate(chamber.time, np.radians(commands[RATE]))
+            use = find_range_use(instrument, study.wave, applied.value)
+            require_range(instrument, use, applied.value, study.wave.coupling, profile)
     else:
         time = np.asarray(row * np.arange(int(hours * 3600 / row * (1 + 1e-12)) + 1), dtype=float)
         columns = {"chamber_temperature_degC": np.full(len(time), temperature - zero_Celsius)}
+    if applied is None and rate:
+        applied = AppliedRate.of(np.radians(rate), time)
     generator = None if seed is None else np.random.default_rng(seed)
     run = run_loops(
-        instrument, time, f, loss, study.bryan_factor, rate=np.radians(applied), both_ways=both_ways, damping=damping, generator=generator
+        instrument, time, f, loss, study.bryan_factor, rate=applied or 0.0, both_ways=both_ways, damping=damping, generator=generator
     )  # fmt: skip
     keys = require_loop(instrument)
     columns = {"time_s": time, **columns, **columns_of(keys, run)}
-    if applied.any():
-        applied = np.broadcast_to(applied, len(time))
-        columns[RATE] = (applied + np.append(applied[1:], applied[-1])) / 2  # its mean over the row, as the output is
+    if applied is not None:
+        columns[RATE] = np.degrees(applied.means(time))  # over the row, as the output is
         columns["measured_rate_deg_per_s"] = columns.pop("bias_deg_per_h") / 3600
     if run.limited:
         say(f"warning: an actuator saturated in {run.limited} of {len(time)} rows.")

@@ -238,7 +238,7 @@ def run_loops(
     inverse_q: ArrayLike,
     bryan_factor: float,
     *,
-    rate: ArrayLike = 0.0,
+    rate: ArrayLike | AppliedRate = 0.0,
     both_ways: bool = False,
     damping: NDArray[np.complex128] | None = None,
     generator: np.random.Generator | None = None,

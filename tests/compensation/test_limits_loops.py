@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from compensation.actuators import Actuators
+from compensation.applied_rate import AppliedRate
 from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, find_margins
 from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
@@ -53,6 +54,26 @@ def test_mean_rate_and_dead_zone_of_a_free_wave(quality, ratio):
     turned = run.angle[-1] - (run.angle[0] if mean else run.angle[3 * len(time) // 4])
     found = turned / wave.bryan_factor / time[-1]
     assert found == pytest.approx(mean, rel=1e-2, abs=1e-6 * threshold)
+
+
+@pytest.mark.parametrize("row", [0.5, 1.0, 10.0])
+def test_a_pulse_between_rows_acts_by_its_integral(row):
+    """From 22 s 5 s of 10 °/s and a line back, corners between samples: ∫ Ω dt = 0.1745 (5.25000 + ½ 0.36) turns a free wave and is what force to rebalance says."""
+    corners = np.array([22.00037, 22.00037, 27.25037, 27.61037])
+    pulse = AppliedRate(corners, np.radians([0.0, 10.0, 10.0, 0.0]))
+    integral, time = np.radians(10.0) * (5.25 + 0.18), row * np.arange(round(60 / row) + 1)
+    wave = from_quality(4432.0, 1e7)
+    assert pulse.means(time)[:-1].sum() * row == pytest.approx(integral, rel=1e-12)
+    assert np.all(pulse.means(time) <= pulse.largest(time) + 1e-12)
+    assert pulse.largest(time).max() == np.radians(10.0)
+    free = simulate_whole_angle(wave, Electronics(), Loops(), time, rate=pulse)
+    assert np.ptp(free.angle) == pytest.approx(wave.bryan_factor * integral, rel=1e-9)
+    assert free.rate == pytest.approx(pulse.means(time), abs=1e-9)
+    held = simulate_rebalance(wave, Electronics(), Loops(), time, rate=pulse)
+    assert held.rate.sum() * row == pytest.approx(integral, rel=1e-6)
+    steady = AppliedRate(np.array([0.0, 22.00037, 60.0]), np.full(3, 1e-3))  # cut rows that nothing bends
+    plain, cut = (simulate_rebalance(wave, ERRORS, Loops(), time, rate=one, angle=0.3) for one in (1e-3, steady))
+    assert cut.rate == pytest.approx(plain.rate, abs=1e-12)
 
 
 @pytest.mark.parametrize(("electronics", "within"), [(ERRORS, 2e-3), (STIFF, 3e-3)], ids=["force", "stiffness"])

@@ -146,6 +146,18 @@ def test_the_rate_of_a_profile_is_applied_and_one_beyond_the_range_is_named_by_i
     assert "applies no drive_amplitude_V" in refuse(["loop", path, "--profile", str(profile), "--out", out])
 
 
+@pytest.mark.parametrize("mode", ["force-rebalance", "whole-angle"])
+def test_limits_a_pulse_between_rows_is_applied_and_its_columns_stay(card, tmp_path, ask, mode):
+    """10 °/s for half a second inside a row of a second, at no row: the mean of its row is 5 °/s."""
+    profile, out = tmp_path / "pulse.csv", str(tmp_path / "run.csv")
+    rows = "0,20,0\n2.2,20,0\n2.200001,20,10\n2.7,20,10\n2.700001,20,0\n6,20,0\n"
+    profile.write_text(f"time_s,chamber_temperature_degC,rate_deg_per_s\n{rows}")
+    ask(["loop", card(f'mode = "{mode}"\n'), "--profile", str(profile), "--out", out, "--noiseless"])
+    record = read_record(out)
+    for name in ("rate_deg_per_s", "measured_rate_deg_per_s"):
+        assert record[name] == pytest.approx([0, 0, 5, 0, 0, 0, 0], abs=5e-3), name
+
+
 def test_range_in_use_is_stated(card, ask):
     """A rate of 59 °/s of 100, and a split that takes eight tenths: √(0.6² + 0.8²); the stiffness takes it off the force."""
     lines = "frequency_split_mHz = 245.0\n"
