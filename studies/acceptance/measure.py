@@ -21,6 +21,7 @@ from studies.acceptance.runs import temperature_column
 from studies.errors import InputError, naming
 from studies.fits.ringdown import Decay
 from studies.record import Record
+from studies.record.misread import named
 from studies.record.one_law import Course
 from studies.record.stability import read_stability
 
@@ -214,7 +215,13 @@ def measure_scale(record: Record) -> Found:
         departure = measure_nonlinearity(rates, means)
     found = {"scale_factor_nonlinearity_ppm": within(departure, sd / full, source, free, least=0.0, scale=1e6)}
     line = np.linalg.pinv(np.column_stack([rates, np.ones_like(rates)]))[0]
-    error = float(line @ means) - 1.0
+    gain = float(line @ means)
+    for name, times in (("measured_rate_deg_per_s", 1 / (gain or np.nan)), ("rate_deg_per_s", gain)):
+        if misread := named(name, times):
+            raise InputError(
+                f"{record.path}: {name} {misread[0]}: measured_rate_deg_per_s changes {gain:.4g} times as much as rate_deg_per_s. {misread[1]}."
+            )
+    error = gain - 1.0
     found["scale_factor_error_ppm"] = within(error, sd * float(np.linalg.norm(line)), source, free, scale=1e6)
     if rates.min() < 0 < rates.max():
         # ΔK/K of b + K Ω + ½ ΔK |Ω|: the scale factor of positive rates less that of negative ones, over their mean (IEEE 528)

@@ -19,11 +19,10 @@ from studies.errors import InputError, naming
 from studies.fits.scale_law import BLOCKS, SWEPT, read_law, warming_of, without_warming
 from studies.models.kinds.scale import RAW
 from studies.record import Record
-from studies.record.misread import mend_by, misreadings
+from studies.record.misread import named
 from studies.record.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
 
 STEPS = ("rough", "bias_compensated", "rate_compensated", "temperature_compensated", "filtered")
-AS = 1.2  # times by which the factor of a misread rate may be missed: the scale over temperature, another gyro of the lot
 STEADY = 0.01  # part of the rate by which a rate table may waver and still turn at one rate
 SHORT, LONG = 1.0, 100.0  # s, at which the random walk is read: a filter of 5 s changes the first, not the second
 
@@ -218,13 +217,13 @@ def _check_applied(runs: Mapping[str, BellRun], output: str) -> None:
     }
     for path, gain in gains.items():
         others = [1.0] if output != RAW[0] else [own for other, own in gains.items() if other != path]
-        for words, times in misreadings("rate_deg_per_s").items():
-            if others and 1 / AS < gain / (times * float(np.median(others)) or np.nan) < AS:
-                which = " or ".join(gains) if output == RAW[0] and len(gains) == 2 and times == -1 else path
-                raise InputError(
-                    f"{which}: rate_deg_per_s {words}: {output} changes {gain / np.median(others):.4g} times as much with it as"
-                    f" {'with that of the other records' if output == RAW[0] else 'it should'}. {mend_by(times)}."
-                )
+        times = gain / (float(np.median(others)) or np.nan) if others else np.nan
+        if found := named("rate_deg_per_s", times):
+            which = " or ".join(gains) if output == RAW[0] and len(gains) == 2 and times < 0 else path
+            raise InputError(
+                f"{which}: rate_deg_per_s {found[0]}: {output} changes {times:.4g} times as much with it as"
+                f" {'with that of the other records' if output == RAW[0] else 'it should'}. {found[1]}."
+            )
 
 
 def _read_run(record: Record, output: str, column: str) -> tuple[BellRun, int]:

@@ -375,6 +375,29 @@ def test_scale_factor_asymmetry_does_not_depend_on_the_rates(levels):
     assert 82 <= kept  # 90 less 2.7 standard deviations
 
 
+@pytest.mark.parametrize(
+    ("measured", "applied", "said"),
+    [
+        (-1.0003, 1.0, "measured_rate_deg_per_s has the opposite sign"),
+        (np.pi / 180, 1.0, "measured_rate_deg_per_s is in rad/s.* Multiply the column by 57.2958"),
+        (1.0, np.pi / 180, "rate_deg_per_s is in rad/s.* Multiply the column by 57.2958"),
+        (3600.0, 1.0, "measured_rate_deg_per_s is in °/h.* Divide the column by 3600"),
+        (0.7, 1.0, ""),
+    ],
+)
+def test_an_output_of_another_sign_or_unit_is_named(measured, applied, said):
+    """It was a scale factor error of −2000300 or −982541 ppm, and a nonlinearity 57 times too small. A gain of 0.7 is an error of the gyro."""
+    rate = np.repeat([-100.0, -50.0, 0.0, 50.0, 100.0], 60)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(rate.size)
+    columns = {"rate_deg_per_s": applied * rate, "measured_rate_deg_per_s": measured * (rate + noise)}
+    record = Record({"time_s": np.arange(float(rate.size))} | columns, path="rates.csv")
+    if said:
+        with pytest.raises(InputError, match=f"rates.csv: {said}"):
+            measure_scale(record)
+    else:
+        assert measure_scale(record)["scale_factor_error_ppm"].value == pytest.approx(-3e5, rel=1e-3)
+
+
 @pytest.mark.parametrize(("again", "apart"), [(False, 0.0), (True, 0.0), (True, 1e-3)])
 def test_what_repeats_at_a_rate_is_no_error_of_the_scale_factor(again, apart):
     """Intervals of a gyro of 30 ppm nonlinearity were 15 times too wide; from hold to hold it may scatter more than within them."""
