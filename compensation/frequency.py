@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
@@ -21,6 +22,7 @@ from compensation.polynomial import PolynomialFit, count_apart, fit_polynomial
 from compensation.regression import FTest, LinearFit, compare_nested
 
 FARTHEST_REFERENCE = 1e4  # °C, and absolute zero
+ODD = 1e-4  # probability with which a table without a mistake has an odd reading
 GRID = 2001  # temperatures at which a curve is looked at
 
 
@@ -200,6 +202,24 @@ def compare_orders(
         return any(compare_nested(own.regression, one.regression).p_value < level / len(higher) for one in higher)
 
     return OrderComparison(fits, tests, level, next(one.order for one in fits if not better(one)))
+
+
+def odd_reading(temperature_degC: Array, frequency: Array, order: int) -> tuple[int, float] | None:
+    """Return the row that lies off the curve of the others, and by how much (Hz), where chance does so once in ten thousand tables.
+
+    t = r / (s √(1 − h)) of Student's distribution, s without the row; the largest of n (Cook and Weisberg 1982).
+    """
+    free = len(frequency) - order - 2
+    if free < 1 or not np.ptp(temperature_degC):
+        return None
+    x = (temperature_degC - temperature_degC.mean()) / np.ptp(temperature_degC)
+    Q = np.linalg.qr(np.vander(x, order + 1))[0]
+    kept, y = 1 - np.sum(Q**2, axis=1), frequency - frequency.mean()
+    away = (y - Q @ (Q.T @ y)) / np.maximum(kept, 1e-12)
+    rest = float(np.sum(away**2 * kept**2)) - away**2 * kept
+    t = np.abs(away) * np.sqrt(kept) / np.sqrt(np.maximum(rest, 1e-300) / free)
+    k = int(np.argmax(t))
+    return (k, float(away[k])) if t[k] > scipy.special.stdtrit(free, 1 - ODD / 2 / len(y)) else None
 
 
 def misreading_degC(one: FrequencyFit, other: FrequencyFit, temperature_degC: ArrayLike) -> Array:

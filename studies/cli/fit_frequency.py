@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Annotated
 
 from compensation.arrays import Array
+from compensation.errors import CompensationError
+from compensation.frequency import odd_reading
 from studies.cli.arguments import ORDER, POSITIVE, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError, naming
@@ -16,8 +18,9 @@ from studies.record import read_frequency_table, read_record, reading_resolution
 from studies.record.one_gyro import records_of_one_gyro
 from studies.record.settled import Soak, advise_hold, find_soaks, settled_table
 from studies.reports import frequency as parts
-from studies.results import Chapter, Result, Table, row_of
+from studies.results import Chapter, Result, Sentence, Table, row_of
 
+DIGITS = 10.0  # steps of the reading by which one that is odd is off at least
 SHOWN = ("temperature_degC", "frequency_Hz", "error_Hz", "left_K", "extrapolated_K")
 SOAKS = (
     "Record | start_s: From (s) .0f | end_s: To (s) .0f | temperature_degC: Temperature (°C) .3f"
@@ -51,8 +54,15 @@ def fit_frequency(
     """
     T, f, step, sources, soaks = _read_points((table, *more), time_constant, left, order)
     read = ", ".join((table, *more))
+    odd, doubt = odd_reading(T, f, order), ""
+    if odd is not None and abs(odd[1]) > DIGITS * step:
+        k, away = odd
+        doubt = f"{f[k]:.10g} Hz at {T[k]:g} °C is {away:+.3g} Hz from the curve of the other readings, as no noise is: correct it, or leave it out."
     with naming(read):
-        study = study_table(T, f, order, reference_temperature, step if resolution is None else resolution)
+        try:
+            study = study_table(T, f, order, reference_temperature, step if resolution is None else resolution)
+        except CompensationError as error:
+            raise CompensationError(doubt or str(error)) from error
     fit = study.fit
     keep_model(save_frequency(fit, sources, "hrg-workbench, hrg fit frequency"), save)
     rows = [row_of(soak, *SHOWN, record="path", start_s="start", end_s="end") for soak in soaks]
@@ -74,6 +84,7 @@ def fit_frequency(
         "Frequency over temperature",
         f"{len(f)} settled points of {read} from {low:.4g} to {high:.4g} °C, fitted with a {parts.name_order(fit.order)}.",
         [
+            doubt and Sentence(doubt, "warning"),
             parts.facts(study),
             parts.order_sentence(study),
             Chapter("Settled parts", [Table("Settled parts of the records", rows, SOAKS, note)]),

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from compensation.errors import CompensationError
-from compensation.frequency import compare_orders, find_turn, fit_frequency
+from compensation.frequency import compare_orders, find_turn, fit_frequency, odd_reading
 from studies.models.kinds.frequency import save_frequency, temperature_error
 
 T = np.linspace(-20, 40, 13)
@@ -116,3 +116,14 @@ def test_nothing_is_extrapolated_unless_asked():
 def test_a_curve_turns_where_its_slope_is_zero(turn):
     """Below the middle of the range the grid's step before it was said."""
     assert find_turn(lambda T: (T - turn) ** 2, (-60.0, 140.0)) == pytest.approx(turn, abs=1e-9)
+
+
+def test_planted_a_mistyped_digit_is_found_and_chance_rarely_is():
+    """4482.56 for 4428.56 Hz, 54 Hz; of tables with noise one in ten thousand may be told, 20 of 20000 by no chance."""
+    random, T = np.random.default_rng(0), np.arange(-20.0, 41.0, 10.0)
+    f = np.array([4416.97, 4421.05, 4424.90, 4428.56, 4432.07, 4435.56, 4439.20])
+    assert odd_reading(T, f, 3) is None
+    f[3] += 54.0
+    assert odd_reading(T, f, 3) == (3, pytest.approx(54.0, abs=0.1))
+    tables = 4400 + 0.3 * T + 0.01 * random.standard_normal((20000, T.size))
+    assert sum(odd_reading(T, one, 3) is not None for one in tables) < 10

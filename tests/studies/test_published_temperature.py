@@ -83,3 +83,15 @@ def test_local_slopes_have_their_published_values():
     np.testing.assert_allclose(STUDY.local_slope_ppm, [92.3, 87.0, 82.7, 79.2, 78.7, 82.0], atol=0.06)
     assert float(STUDY.fit.slope_ppm(20.0)) == pytest.approx(79.2, abs=0.05)
     assert float(STUDY.fit.slope_ppm(0.0)) == pytest.approx(84.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("f", "mistake"), [(F, 54.0), (4400 + 0.3 * T - 1e-4 * T**2, 1.0)])
+def test_planted_a_mistyped_reading_is_named_by_its_row(tmp_path, capsys, f, mistake):
+    """The printed table with two digits exchanged had a curve that turns, and no row to look at; 1 Hz of an exact table was not noticed."""
+    rows = "".join(
+        f"{a:g},{b:.2f}\n" for a, b in zip(T, f + np.where(np.arange(T.size) == 3, mistake, 0.0), strict=True)
+    )
+    (tmp_path / "t.csv").write_text(f"temperature_degC,frequency_Hz\n{rows}")
+    assert main(["fit", "frequency", str(tmp_path / "t.csv")]) == (2 if mistake > 2 else 0)
+    said = " ".join("".join(capsys.readouterr()).split())
+    assert f"{f[3] + mistake:.2f} Hz at {T[3]:g} °C is {mistake:+.0f} Hz from the curve" in said
