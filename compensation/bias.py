@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.integrate import cumulative_trapezoid
 
 from compensation.arrays import Array
 from compensation.constants import NINETY, zero_Celsius
@@ -74,7 +74,7 @@ class AveragedRun:
         state = follow_lag(self.fine.columns[name], np.diff(time), lag)
         if time.size == blocks.time.size:
             return state
-        area = cumulative_trapezoid(state - state[0], time, initial=0)
+        area = scipy.integrate.cumulative_trapezoid(state - state[0], time, initial=0)
         half = 0.5 * blocks.width
         ends = [np.clip(blocks.time + side, time[0], time[-1]) for side in (-half, half)]
         first, last = (np.interp(end, time, area) for end in ends)
