@@ -21,6 +21,16 @@ from compensation.wave import StandingWave, turn
 BOLTZMANN = 1.380649e-23  # J/K
 
 
+def uneven_of(gain_ratio: float) -> float:
+    """Return (g_x − g_y) over the mean of both, of a ratio g_x/g_y − 1."""
+    return 2 * gain_ratio / (2 + gain_ratio)
+
+
+def ratio_of(uneven: float) -> float:
+    """Return g_x/g_y − 1 of (g_x − g_y) over the mean of both."""
+    return 2 * uneven / (2 - uneven)
+
+
 @dataclass(frozen=True)
 class Channels:
     """The pair of pick-offs, or of drives: δ = g_x/g_y − 1, phase difference η, skew κ, rotation β on the shell, phase φ (rad)."""
@@ -38,7 +48,7 @@ class Channels:
 
     def matrix(self, harmonic: int) -> Complex:
         """Return G (2, 2)."""
-        uneven, late = self.gain_ratio / (2 + self.gain_ratio), np.exp(0.5j * self.phase_difference)
+        uneven, late = uneven_of(self.gain_ratio) / 2, np.exp(0.5j * self.phase_difference)
         gains = np.diag([(1 + uneven) * late, (1 - uneven) / late]) * np.exp(1j * self.phase)
         square, skewed = np.cos(self.skew / 2), np.sin(self.skew / 2)
         return np.asarray(gains @ [[square, skewed], [skewed, square]] @ turn(-harmonic * self.rotation))

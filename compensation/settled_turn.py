@@ -143,16 +143,14 @@ def _integrate(
     order = np.arange(len(shown))
     edges, first, begin, end = applied.pieces(t)
     of = np.repeat(np.arange(last), np.diff(first))  # the row of each piece
-    known = k * np.maximum(np.abs(begin), np.abs(end)) + np.maximum(np.abs(command[:-1]), np.abs(command[1:]))[of]
+    known = k * np.maximum(np.abs(begin), np.abs(end)) + _either(np.abs(command))[of]
     speed = 2 * n * (known + _either(np.abs(drift).sum(axis=1))[of])
     pieces = np.maximum(np.ceil(speed * np.diff(edges) / TURN), 1.0).astype(int)
     piece, done = _cut(pieces)
     row, h = of[piece], (np.diff(edges) / pieces)[piece]
-    at = (edges[piece] - t[row] + np.array([done, done + 0.5, done + 1]) * h) / np.diff(t)[
-        row
-    ]  # begin, middle, end of steps
-    lines = k * np.stack([begin, end - begin])[:, piece]
-    turning = lines[0] + lines[1] * np.array([done, done + 0.5, done + 1]) / pieces[piece]
+    passed = np.array([done, done + 0.5, done + 1])  # steps of the piece before begin, middle and end of each
+    at = (edges[piece] - t[row] + passed * h) / np.diff(t)[row]
+    turning = k * (begin[piece] + (end - begin)[piece] * passed / pieces[piece])
     commanded = command[row] + at * np.diff(command)[row]
 
     def swept(c: Array, s: Any) -> Array:

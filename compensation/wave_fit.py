@@ -26,7 +26,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.arrays import Array
-from compensation.electronics import Channels
+from compensation.electronics import Channels, ratio_of, uneven_of
 from compensation.errors import CompensationError
 from compensation.noise_regression import fit_coloured
 from compensation.ringdown.answer import Estimate
@@ -104,12 +104,9 @@ def fit_whole_angle(
     # In one direction what a commanded turn leaks through uneven gains is not told from the splits.
     leak = 0.0 if both_ways else float(np.mean(command))
     phi = coupling * np.concatenate([[0.0], np.cumsum(indicated[:-1] - known)]) * step
-    card = np.array([2 * pickoff_gain_ratio / (2 + pickoff_gain_ratio), pickoff_skew])
+    card = np.array([uneven_of(pickoff_gain_ratio), pickoff_skew])
     gains, spread = np.zeros(2) if both_ways else card, UNEVEN
-    drives, lost = (
-        np.array([2 * drive_gain_ratio / (2 + drive_gain_ratio), drive_skew]),
-        np.flatnonzero(bad["rate"][:-1])[:FEW],
-    )
+    drives, lost = np.array([uneven_of(drive_gain_ratio), drive_skew]), np.flatnonzero(bad["rate"][:-1])[:FEW]
     for _ in range(4):
         behind = straighten(x / 2, *gains)
         mean, turned, missed, spread, odd = _turned(
@@ -141,7 +138,7 @@ def fit_whole_angle(
     if epsilon is not None and not wrong:
         estimates["phase_error"] = epsilon
     if both_ways and "damping" not in wrong:
-        estimates |= {"gain_ratio": (2 * gains[0] / (2 - gains[0]), spread[0]), "skew": (gains[1], spread[1])}
+        estimates |= {"gain_ratio": (ratio_of(gains[0]), spread[0]), "skew": (gains[1], spread[1])}
 
     def true(one: Told) -> Told:
         """Damping as it is without the gains, which the driven wave has in it."""
@@ -242,7 +239,7 @@ def _widen(
 
 def straighten(psi: Array, uneven: float, skew: float) -> Array:
     """Return ψ − ψ_m, what the pick-offs' gains, uneven by δ, and skew take from the angle that they show (rad)."""
-    pickoff = Channels(2 * uneven / (2 - uneven), skew=skew).matrix(1).real
+    pickoff = Channels(ratio_of(uneven), skew=skew).matrix(1).real
     x, y = np.linalg.solve(pickoff, np.array([np.cos(psi), np.sin(psi)]))
     return np.asarray(np.arctan2(y * np.cos(psi) - x * np.sin(psi), x * np.cos(psi) + y * np.sin(psi)))
 

@@ -48,13 +48,8 @@ def simulate_whole_angle(
     angle, offset = electronics.shown(rows.harmonic, angle), np.zeros(4)
     psi = rows.harmonic * angle
     settled = settle_rebalance(rows.at_row(0), electronics, cut.begin[0], angle, precession=commanded[0])
-    means = (
-        1.0 + 0j,
-        0j,
-        float(settled.decay[0]),
-        course.start - float(settled.omega[0]),
-        float(settled.quadrature[0]),
-    )
+    decay, late, quadrature = settled.decay[0], course.start - settled.omega[0], settled.quadrature[0]
+    means = 1.0 + 0j, 0j, float(decay), float(late), float(quadrature)
     state = loop.settle(course.forcing(0, 0.0, psi, means), offset)
     at = loop.places
     noise = electronics.noise

@@ -12,18 +12,8 @@ PRINTED = str.maketrans({"−": "-", "–": "-", "’": "'", "\u00a0": " ", "\u2
 """Signs of printers and word processors, and those of keyboards."""
 EXPONENT = r"(?:[eE][+-]?\d{1,2})?"
 SHAPE = re.compile(rf"([+-]?(?:\d+(?:[.,' ]\d+)*[.,]?|[.,]\d+){EXPONENT})(?:\s*((?:[^\W\d]|[°º℃℉])\D{{0,11}}))?")
-QUANTITIES = (
-    "_degC",
-    "_Hz",
-    "_deg_per_h",
-    "_deg_per_s",
-    "_V",
-    "_deg",
-    "_dBm",
-    "_dB",
-    "_W",
-    "_counts",
-)  # as columns end
+# as columns end
+QUANTITIES = ("_degC", "_Hz", "_deg_per_h", "_deg_per_s", "_V", "_deg", "_dBm", "_dB", "_W", "_counts")
 TIMES = (
     *((r"s|se[ck]\w*", "s"), (r"ms|milli\w*", "ms"), (r"us|micro\w*", "us"), (r"ns|nano\w*", "ns")),
     *((r"min\w*", "min"), (r"h|hrs?|hours?|std", "h"), (r"d|days?", "days")),

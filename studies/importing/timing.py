@@ -30,9 +30,8 @@ USUAL_STEP = (1e-3, 3600.0)  # s between rows
 def find_time(look: Look, evenly: bool = False) -> tuple[list[str], str, str]:
     """Return the time columns, their format and doubts; `evenly`: the file states its step, and a column that merely rises is no time."""
     names, hints, numbers = look.names, look.hints, look.numbers
-    cells = {
-        name: [cell for cell in own if cell != name] for name, own in look.columns.items()
-    }  # the head may come again
+    # the head may come again
+    cells = {name: [cell for cell in own if cell != name] for name, own in look.columns.items()}
     named = [name for name in names if re.search(TIME_WORDS, name.lower()) and not find_unit(HOUSING, hints[name])]
     named = [name for name in named if name != "T" or "t" not in names]
     stamps = [name for name in names if cells[name] and all(is_stamp(cell) for cell in cells[name] if cell)]

@@ -206,17 +206,15 @@ def settled_columns(
     applied = rate.at(np.asarray(time)) if isinstance(rate, AppliedRate) else rate
     if loop.mode == "force-rebalance":
         run = settle_rebalance(wave, electronics, applied, angle)
-    elif time is not None and pattern_angle is not None:  # whatever was commanded has turned it so
-        if means:
-            run = read_turned(wave, electronics, time, angle, rate=rate)
-        else:
-            run = settle_rebalance(wave, electronics, applied, angle, np.gradient(angle, time))
+    elif time is None:
+        run = settle_rebalance(wave, electronics, applied, angle, precession=precession)
+    elif pattern_angle is None:
+        run = turn_settled(wave, electronics, time, rate=rate, precession=precession, angle=start, wander=wander)
+        run = run if means else settle_rebalance(wave, electronics, applied, run.angle, precession=precession)
+    elif means:  # whatever was commanded has turned it so
+        run = read_turned(wave, electronics, time, angle, rate=rate)
     else:
-        if time is not None and pattern_angle is None:
-            run = turn_settled(wave, electronics, time, rate=rate, precession=precession, angle=start, wander=wander)
-            angle = run.angle
-        if time is None or not means:
-            run = settle_rebalance(wave, electronics, applied, angle, precession=precession)
+        run = settle_rebalance(wave, electronics, applied, angle, np.gradient(angle, time))
     return columns_of(loop, run)
 
 

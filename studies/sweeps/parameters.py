@@ -7,11 +7,9 @@ profile of [position, value] pairs as a whole stands for its mean along the arc:
 """
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from msgspec import to_builtins
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError, nearest
@@ -19,6 +17,7 @@ from studies.instrument.card import OF_GEOMETRY, Instrument
 from studies.instrument.dotted import look_up, names, plain_number
 from studies.instrument.material_values import LAW
 from studies.instrument.registry import possible_keys
+from studies.instrument.settings import Setting, settings_of
 from studies.instrument.tables.material import GIVEN
 from studies.sweeps.expressions import Derived, fill_in
 
@@ -92,8 +91,5 @@ def _default(instrument: Instrument, table: str, key: str) -> float | str | None
     """Return the documented default of a key that the card leaves out, None where it follows from other keys."""
     if f"{table}.{key}".startswith(LAW):
         return 0.0
-    for keys in instrument.tables[table].keys.values():
-        with suppress(LookupError, ValueError, TypeError):
-            value = look_up(to_builtins(keys), key)
-            return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
-    return None
+    value = settings_of(instrument).get(f"{table}.{key}", Setting()).value
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
