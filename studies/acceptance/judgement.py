@@ -55,6 +55,7 @@ class Acceptance:
     band: float | None
     allan: AllanDeviation | None
     noise: NoiseCoefficients | None
+    noisiest: str  # drift record that these two are of
 
     @property
     def verdict(self) -> Literal["pass", "fail", "incomplete"]:
@@ -75,6 +76,7 @@ def judge(
     sorted_runs, left = sort_records(records, output)
     found: Found = measure.measure_seal(records)
     allan = noise = band = None
+    noisiest = ""
     if "warm-up" in sorted_runs:
         asked = None if limits is None else limits.warm_up.band_deg_per_h
         more, band = measure.measure_warm_up(sorted_runs["warm-up"][0], output, asked)
@@ -82,7 +84,7 @@ def judge(
     if "temperature" in sorted_runs:
         found |= measure.measure_temperature(sorted_runs["temperature"], output)
     if "drift" in sorted_runs:
-        more, allan, noise = measure.measure_drift(sorted_runs["drift"], output)
+        more, noisiest, allan, noise = measure.measure_drift(sorted_runs["drift"], output)
         found |= more
     for test, read in FIRST.items():
         for record in sorted_runs.get(test, [])[:1]:
@@ -100,4 +102,4 @@ def judge(
         short = f"the output at rest is of {length_of(record):.4g} s, less than an hour"
         none = short if output in record and "rate_deg_per_s" not in record else "its columns fit none of the tests"
         used[record.path] = "growth of 1/Q" if record.path in grown else f"no test: {none}"
-    return Acceptance(lines, used, band, allan, noise)
+    return Acceptance(lines, used, band, allan, noise, noisiest)

@@ -33,6 +33,7 @@ WARM_BLOCK = 10.0
 HOLD_PARTS = 4  # of a constant rate, whose means tell its noise
 MOST_POINTS = 100_000
 CONFIDENCE = 0.9
+LONG = 0.5  # of the longest drift record: a shorter one does not tell its slow noise
 YEAR = 365.25 * 86400.0
 
 
@@ -64,8 +65,8 @@ def of_fit(fit: LinearFit, place: int, sources: Sequence[str], scale: float = 1.
     return within(value, sd, sources, fit.degrees_of_freedom, scale=scale)
 
 
-def measure_drift(records: Sequence[Record], output: str) -> tuple[Found, AllanDeviation, NoiseCoefficients]:
-    """Bias, its repeatability, and the noise coefficients of the longest record (12.11)."""
+def measure_drift(records: Sequence[Record], output: str) -> tuple[Found, str, AllanDeviation, NoiseCoefficients]:
+    """Bias, its repeatability, and the largest noise coefficients of the long records (12.11), with the record of the largest bias instability."""
     means: list[tuple[float, float]] = []
     for record in records:
         time = record["time_s"]  # a mean is of at least ten rows, and there are at most some thousands of them
@@ -84,13 +85,28 @@ def measure_drift(records: Sequence[Record], output: str) -> tuple[Found, AllanD
         spread, free = float(values.std(ddof=1)), len(values) - 1
         found["bias_deg_per_h"] = within(float(values.mean()), spread / math.sqrt(len(values)), paths, free)
         found["bias_repeatability_deg_per_h"] = _deviation(spread, free, paths)
-    longest = max(records, key=lambda record: record["time_s"][-1] - record["time_s"][0])
-    allan, noise = _stability(longest, output)
-    walk = "angle_random_walk_deg_per_rt_h", "rate_random_walk_deg_per_h_per_rt_h"
-    found[walk[0]] = within(noise.N, noise.N_uncertainty, [longest.path], least=0.0, scale=1 / 60)
-    found[walk[1]] = within(noise.K, noise.K_uncertainty, [longest.path], least=0.0, scale=60.0)
-    found["bias_instability_deg_per_h"] = Measured(*allan.bias_instability, (longest.path,))
-    return found, allan, noise
+    lasts = [float(np.ptp(record["time_s"])) for record in records]
+    long = [record for record, own in zip(records, lasts, strict=True) if own >= LONG * max(lasts)]
+    each = [(record.path, *_stability(record, output)) for record in long]
+    angle = [within(one.N, one.N_uncertainty, [path], least=0.0, scale=1 / 60) for path, _, one in each]
+    rate = [within(one.K, one.K_uncertainty, [path], least=0.0, scale=60.0) for path, _, one in each]
+    flicker = [Measured(*allan.bias_instability, (path,)) for path, allan, _ in each]
+    found["angle_random_walk_deg_per_rt_h"] = largest(angle)
+    found["rate_random_walk_deg_per_h_per_rt_h"] = largest(rate)
+    found["bias_instability_deg_per_h"] = largest(flicker)
+    return found, *max(each, key=lambda one: one[1].bias_instability[0])
+
+
+def largest(found: Sequence[Measured]) -> Measured:
+    """Return the largest of a quantity over records, each of which is to keep a limit: of values, and of ends of intervals, where all have them."""
+    lows, highs = ([end for one in found if (end := getattr(one, name)) is not None] for name in ("low", "high"))
+    value = max(found, key=lambda one: one.value)
+    return Measured(
+        value.value,
+        max(lows) if len(lows) == len(found) else value.low,
+        max(highs) if len(highs) == len(found) else None,
+        value.sources,
+    )
 
 
 def _stability(record: Record, output: str) -> tuple[AllanDeviation, NoiseCoefficients]:

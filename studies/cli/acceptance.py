@@ -69,8 +69,8 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
                 check_card_frequency(instrument, np.median(f, keepdims=True) if f.size else f, record.path, law)
             except InputError as doubt:
                 say(f"warning: {doubt}")
-        if found.used[record.path].startswith("no test"):
-            say(f"warning: {record.path} is not used: {found.used[record.path].removeprefix('no test: ')}.")
+        if "no test: " in found.used[record.path] or ", not used: " in found.used[record.path]:
+            say(f"warning: {record.path} is not used: {found.used[record.path].partition(': ')[2]}.")
     for line in lines:
         if line["limit"] is not None and line["needs"]:
             say(f"warning: {limits} limits {line['key']}, but no record gives it; it needs {line['needs']}.")
@@ -91,6 +91,10 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     note = "A limit is judged only if the whole interval lies on one side of it. An upper limit applies to the magnitude."  # fmt: skip
     if any(row["section"] == "12.9" and not row["needs"] for row in rows):
         note += " The scale factor is that of the straight line; its error is that of the noise while a rate is held and, where they scatter more, of rates held again: without such a record errors from hold to hold are not known."
+    if sum(kind == "drift" for kind in found.used.values()) > 1:
+        note += (
+            " Noise coefficients are the largest of the drift records that are at least half as long as the longest."
+        )
     if found.band is not None:
         note += f" Warm-up ends when the output stays within ±{found.band:.3g} °/h of its final value."
     parts: list[Chapter | Part] = [
@@ -162,5 +166,6 @@ def _drift(found: Acceptance) -> list[Figure | Sentence]:
             return made
 
     label = "overlapping Allan deviation, 90 % interval; dashed: N, B, K"
-    caption = "Allan deviation of the longest drift record."
+    several = sum(kind == "drift" for kind in found.used.values()) > 1
+    caption = f"Allan deviation of {found.noisiest}{', the drift record with the largest bias instability' if several else ''}."
     return [Figure(draw, caption, "Allan deviation over averaging time, both logarithmic."), Sentence(words)]

@@ -75,6 +75,23 @@ def judged(capsys, folder, names, *options):
 ALL = ("rest0", "rest1", "rest2", "cycle", "rates", "rundown", "warm")
 
 
+def test_the_noisiest_of_several_drift_records_is_judged_in_any_order(folder, capsys):
+    """Planted: white noise of 0.01 and of 0.03 °/√h; a limit between them is not met, whichever record comes first; a short record does not count."""
+    t, g = np.arange(0, 20000.0), np.random.default_rng(3)
+    for name, size, rows in (("still", 0.6, 20000), ("noisy", 1.8, 15000), ("short", 6.0, 4000)):
+        columns = {"time_s": t[:rows], "bias_deg_per_h": 2 + g.normal(0, size, rows)}
+        write_record(Record(columns, instrument="free-dome"), folder / f"{name}.csv")
+    path = limits(folder, "angle_random_walk_deg_per_rt_h = 0.02")
+    said = []
+    for names in (("still", "noisy", "short"), ("short", "noisy", "still")):
+        _, payload, _ = judged(capsys, folder, names, "--limits", path)
+        said.append(next(one for one in payload["quantities"] if one["key"] == "angle_random_walk_deg_per_rt_h"))
+        assert payload["verdict"] == "fail"
+    assert said[0] == said[1]
+    assert said[0]["low"] < 0.03 < said[0]["high"]
+    assert said[0]["records"] == [str(folder / "noisy.csv")]
+
+
 @pytest.mark.slow
 def test_planted_quantities_are_found(folder, capsys):
     path = limits(
