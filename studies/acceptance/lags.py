@@ -1,6 +1,6 @@
-"""The resonator's temperature behind a thermometer: two lags in series, those with which the frequency follows it best."""
+"""The resonator's temperature behind a thermometer: two lags in series, those with which the frequency, or without it the bias, follows it best."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy
@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 from compensation.arrays import Array
 from studies.record.one_law import Course, parabola
 
+Pair = tuple[float, float]
+Design = Callable[[Sequence[Course], Sequence[float]], Array]
 LAGS = np.append(0.0, np.geomspace(30.0, 1e4, 16))
 """Lags (s) among which a pair is looked for first; 0: none."""
 SHORTEST = 1.0
@@ -20,16 +22,12 @@ MOST = 2000
 
 
 def find_lags(
-    runs: Sequence[Course], keep: Array | None = None, near: Sequence[float] | None = None
-) -> tuple[float, float]:
-    """Return the two lags (s) behind which a parabola of the temperature leaves least of the frequency, from the rows kept."""
-    f = np.concatenate([run.output for run in runs])
-    keep = np.ones(f.size, dtype=bool) if keep is None else keep
+    runs: Sequence[Course], design: Design = parabola, keep: Array | None = None, near: Sequence[float] | None = None
+) -> Pair:
+    """Return the two lags (s) behind which a design of the temperature leaves least of the output, from the rows kept."""
 
     def left(lags: Sequence[float]) -> float:
-        design = parabola(runs, lags)[keep]
-        found = f[keep] - design @ np.linalg.lstsq(design, f[keep], rcond=None)[0]
-        return float(found @ found)
+        return left_by(runs, design, lags, keep)
 
     best = near or min(((one, other) for k, one in enumerate(LAGS) for other in LAGS[: k + 1]), key=left)
     start = np.log(np.maximum(best, 2 * SHORTEST))
@@ -42,23 +40,35 @@ def find_lags(
     return float(one), float(other)
 
 
-def slope_behind(runs: Sequence[Course]) -> tuple[tuple[float, float], list[tuple[float, float]], float, float]:
+def left_by(runs: Sequence[Course], design: Design, lags: Sequence[float], keep: Array | None = None) -> float:
+    """Return the sum of squares that a design leaves of the output, of the rows kept."""
+    kept = slice(None) if keep is None else keep
+    X, y = design(runs, lags)[kept], np.concatenate([run.output for run in runs])[kept]
+    found = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+    return float(found @ found)
+
+
+def lags_and_without(runs: Sequence[Course], design: Design = parabola) -> tuple[Pair, list[tuple[Array, Pair]]]:
+    """Return the lags (s), and for each of the parts of the rows which are kept without it, and the lags that these tell."""
+    lags, size = find_lags(runs, design), sum(run.output.size for run in runs)
+    part = np.arange(size) * PARTS // size
+    return lags, [(keep, find_lags(runs, design, keep, lags)) for keep in (part != one for one in range(PARTS))]
+
+
+def slope_behind(runs: Sequence[Course]) -> tuple[Pair, list[Pair], float, float]:
     """Return the lags (s), those without each of the parts of the runs, the slope of the frequency at the mean of the resonator's temperature, and its standard error.
 
     The error is the jackknife's over the parts, the lags found anew without each of them: what the lags leave is no noise.
     """
     f = np.concatenate([run.output for run in runs])
 
-    def slope(lags: Sequence[float], keep: Array) -> float:
+    def slope(lags: Pair, keep: Array) -> float:
         design = parabola(runs, lags)
         return float(np.linalg.lstsq(design[keep], f[keep], rcond=None)[0][1])
 
-    lags = find_lags(runs)
-    part = np.arange(f.size) * PARTS // f.size
-    kept = [part != one for one in range(PARTS)]
-    without = [find_lags(runs, keep, lags) for keep in kept]
-    error = jackknife([slope(own, keep) for own, keep in zip(without, kept, strict=True)])
-    return lags, without, slope(lags, np.ones(f.size, dtype=bool)), float(error)
+    lags, without = lags_and_without(runs)
+    error = jackknife([slope(own, keep) for keep, own in without])
+    return lags, [own for _, own in without], slope(lags, np.ones(f.size, dtype=bool)), float(error)
 
 
 def jackknife(values: Sequence[ArrayLike]) -> Array:

@@ -42,7 +42,7 @@ QUANTITIES = tuple(
         ("bias_temperature_slope_deg_per_h_per_K", "12.8", "bias sensitivity to temperature", "deg/h/K", THERMAL),
         (RATE, "12.8", "bias sensitivity to temperature rate", "deg/h/(K/s)", THERMAL),
         ("bias_temperature_residual_deg_per_h", "12.8", "bias residual after both, rms of 100 s averages", "deg/h", THERMAL),
-        ("frequency_temperature_slope_ppm_per_K", "12.8", "frequency sensitivity to temperature", "ppm/K", THERMAL),
+        ("frequency_temperature_slope_ppm_per_K", "12.8", "frequency sensitivity to temperature", "ppm/K", THERMAL + ", with frequency_Hz"),
         ("scale_factor_error_ppm", "12.9", "scale factor error", "ppm", RATES),
         ("scale_factor_nonlinearity_ppm", "12.9", "scale factor nonlinearity, of full scale", "ppm", RATES),
         ("scale_factor_asymmetry_ppm", "12.9", "scale factor asymmetry, positive minus negative rates", "ppm", RATES),

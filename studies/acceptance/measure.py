@@ -16,7 +16,7 @@ from compensation.regression import LinearFit, fit_linear
 from compensation.ringdown.answer import Estimate
 from compensation.ringdown.trace import analyse_trace
 from compensation.stability import AllanDeviation, NoiseCoefficients
-from studies.acceptance.lags import MOST, PARTS, jackknife, slope_behind
+from studies.acceptance.lags import MOST, PARTS, jackknife, lags_and_without, left_by, slope_behind
 from studies.acceptance.runs import temperature_column
 from studies.errors import InputError, naming
 from studies.fits.ringdown import Decay
@@ -131,7 +131,7 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
 
     The bias bends over temperature where that lowers m ln SSE + p ln m of whitened rows: a bend that is left out is told as a rate.
 
-    Where the frequency is measured, the temperature is that of the resonator, which lags as the frequency shows.
+    The temperature is that of the resonator, which lags as the frequency shows, or where it is not measured as the bias does.
     """
     whole = sum(float(np.ptp(record["time_s"])) for record in records)
     followed = [_follow(record, whole / MOST) for record in records if record.has_values("frequency_Hz")]
@@ -148,15 +148,14 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
         ends = np.cumsum([0, *(len(run.time) for run in courses)])
         runs = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
         names = [*(f"offset {k + 1}" for k in range(len(runs))), *SENSITIVITIES]
+        if not followed:
+            late, parts = lags_and_without(courses, _behind)
+            gain = len(y) * math.log(left_by(courses, _behind, lags) / left_by(courses, _behind, late))
+            if gain > 2 * math.log(len(y)):  # both pay for themselves
+                lags, without = late, [own for _, own in parts]
 
         def fit_behind(lags: Sequence[float], bends: int = 0, theta: float | None = None) -> ColouredFit:
-            followed = [run.behind(*lags) for run in courses]
-            T = np.concatenate(followed)
-            curves = (scipy.interpolate.CubicSpline(run.time, own) for own, run in zip(followed, courses, strict=True))
-            slope = np.concatenate([curve(run.time, 1) for curve, run in zip(curves, courses, strict=True)])
-            offsets = scipy.linalg.block_diag(*(np.ones((len(own), 1)) for own in followed))
-            powers = range(2, 2 + bends)
-            X = np.column_stack([offsets, T - T.mean(), slope, *((T - T.mean()) ** n for n in powers)])
+            X, powers = _behind(courses, lags, bends), range(2, 2 + bends)
             with naming(", ".join(paths)):
                 return fit_coloured(X, y, [*names, *(f"temperature^{n}" for n in powers)], runs, theta)
 
@@ -179,6 +178,16 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
         size = float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
         found["bias_temperature_residual_deg_per_h"] = _deviation(size, free, paths)
     return found
+
+
+def _behind(runs: Sequence[Course], lags: Sequence[float], bends: int = 1) -> Array:
+    """Columns of a bias behind lags: an offset of each run, the temperature, its rate, and powers of it."""
+    followed = [run.behind(*lags) for run in runs]
+    T = np.concatenate(followed)
+    curves = (scipy.interpolate.CubicSpline(run.time, own) for own, run in zip(followed, runs, strict=True))
+    slope = np.concatenate([curve(run.time, 1) for curve, run in zip(curves, runs, strict=True)])
+    offsets = scipy.linalg.block_diag(*(np.ones((len(own), 1)) for own in followed))
+    return np.column_stack([offsets, T - T.mean(), slope, *((T - T.mean()) ** n for n in range(2, 2 + bends))])
 
 
 def _temperature_of(record: Record) -> str:

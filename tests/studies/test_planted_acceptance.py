@@ -158,6 +158,27 @@ def test_sensitivities_are_of_a_resonator_that_lags_its_housing(tmp_path, capsys
         assert lines[key]["low"] - reach < truth < lines[key]["high"] + reach, key
 
 
+def test_without_a_frequency_the_bias_tells_how_late_the_resonator_is():
+    """Planted: 0.05 °/h/K and 200 °/h/(K/s) behind lags of 1900 s and 300 s; at no lag the slope was 0.058 in every run."""
+    hours = 3600.0 * np.array([0, 1, 1.7, 4, 5, 7, 8.5, 9, 12])
+    t, held = np.arange(0.0, hours[-1], 20.0), {"slope": 0, "rate": 0}
+    T = np.interp(t, hours, [20, 20, -15, -15, 45, 45, 0, 30, 30]) + 0.2 * np.sin(t / 400.0)
+    resonator = lag(t, lag(t, T, 1900.0), 300.0)
+    for seed in range(6):
+        noise = np.random.default_rng(seed).normal(0, 0.15, t.size)
+        bias = 1 + 0.05 * (resonator - 20) + 200.0 * np.gradient(resonator, t) + noise
+        columns = {"time_s": t, "housing_temperature_degC": T, "bias_deg_per_h": bias}
+        found = measure_temperature([Record(columns, path="run")], "bias_deg_per_h")
+        slope = found["bias_temperature_slope_deg_per_h_per_K"]
+        rate = found["bias_temperature_rate_deg_per_h_s_per_K"]
+        assert slope.value == pytest.approx(0.05, rel=0.02)
+        held["slope"] += slope.low < 0.05 < slope.high
+        held["rate"] += rate.low < 200.0 < rate.high
+        assert found["bias_temperature_residual_deg_per_h"].value < 1.2 * 0.15 / np.sqrt(5)
+    assert held["slope"] >= 4
+    assert held["rate"] >= 4
+
+
 @pytest.mark.slow
 def test_intervals_over_temperature_know_the_error_of_the_lags():
     """Where a noisy frequency tells the lags badly, 90 % intervals of the bias's sensitivities held the truth in 5 runs of 20."""
