@@ -16,7 +16,7 @@ from studies.calibration.estimates import Estimate, OfEstimates, estimate, find_
 from studies.calibration.fit import CardFit, descend, fit
 from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of
 from studies.calibration.levels import LEVELS, turn_on, with_level_spread, without_idle_levels
-from studies.calibration.misreading import check_readings
+from studies.calibration.misreading import check_loss, check_readings
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
 from studies.calibration.priors import Priors, check_exact, gather_priors
 from studies.calibration.problem import CardProblem, State, wide_law
@@ -120,6 +120,7 @@ def calibrate(
     turning = loop is not None and loop.mode == "whole-angle"
     runs, tables = observe(records, named, turning=turning), tuple(tables)
     for record in records:
+        check_loss(instrument, record)
         if "frequency_Hz" in record:
             check_card_frequency(instrument, record["frequency_Hz"], record.path)
     for table in tables:

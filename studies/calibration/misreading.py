@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     Left = Mapping[str, tuple[float, float]]
 
-FREQUENCY = "frequency_Hz"
+FREQUENCY, LOSS = "frequency_Hz", "inverse_q"
 ROWS = 400
 FOLLOWED, REFUSED = 0.3, 0.4
 """Parts of a frequency's changes: left of them by a reading that agrees, and by one that does not."""
@@ -143,6 +143,15 @@ def _check_unit(instrument: "Instrument", record: "Record") -> None:
         raise InputError(
             f"{record.path}: {BIAS} scatters by {scatter:.2g} °/h from row to row, {stated / scatter:.0f} times less than the card states:"
             " the column is probably in °/s. Multiply it by 3600; if the gyro is as quiet as this, lower [noise] bias_white_deg_per_rt_h."
+        )
+
+
+def check_loss(instrument: "Instrument", record: "Record") -> None:
+    """Refuse a 1/Q that is negative throughout; of a wave that turns freely the drive may be."""
+    turning = instrument.loop is not None and instrument.loop.mode == "whole-angle"
+    if LOSS in record and not turning and (middle := float(np.nanmedian(record[LOSS]))) < 0:
+        raise InputError(
+            f"{record.path}: {LOSS} is negative ({middle:.3g} in the middle); a loss is not. Change its sign."
         )
 
 

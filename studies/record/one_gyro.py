@@ -14,6 +14,7 @@ from studies.record.one_law import ANY_PATH, LEVELLED, Course, Followed, Law, co
 from studies.record.repeated import drop_repeats
 from studies.record.rest import DRIVING, check_record, without_spikes, without_stuck
 
+HOUSING, CHAMBER, _ = DRIVING
 FREQUENCY, BIAS, RATE = "frequency_Hz", "bias_deg_per_h", "measured_rate_deg_per_s"
 ONE_GYRO, STEEPEST = 5e-3, 3e-4  # relative, and 1/K: what one gyro does from run to run, and over temperature at most
 TIMES = {
@@ -154,9 +155,13 @@ def check_one_reading(records: Sequence[Record]) -> None:
 
 
 def check_one_clock(records: Sequence[Record]) -> None:
-    """Refuse a run whose temperature and frequency were logged by clocks that are hours apart."""
-    drive = _drive_of(records)
-    members, runs = _courses(records, drive, FREQUENCY)
+    """Refuse a run whose temperatures, or whose temperature and frequency, were logged by clocks that are hours apart."""
+    for drive, output in ((_drive_of(records), FREQUENCY), (CHAMBER, HOUSING)):
+        _check_clock(records, drive, output)
+
+
+def _check_clock(records: Sequence[Record], drive: str, output: str) -> None:
+    members, runs = _courses(records, drive, output)
     if len(runs) < 2:
         return
     moved = [
@@ -175,7 +180,7 @@ def check_one_clock(records: Sequence[Record]) -> None:
     ):
         k, hours, _ = moved[best]
         raise InputError(
-            f"{_path(records, members[k])}: {drive} is {abs(hours)} h {'behind' if hours > 0 else 'ahead of'} {FREQUENCY}:"
+            f"{_path(records, members[k])}: {drive} is {abs(hours)} h {'behind' if hours > 0 else 'ahead of'} {output}:"
             " moved so, one law holds in all runs. Were they logged by two clocks? Move one of the columns in time, or leave the record out."
         )
 

@@ -114,6 +114,12 @@ def test_a_bias_in_degrees_per_second_is_refused_before_the_fit(card, record):
         calibrate(card, [spoilt(record, bias_deg_per_h=lambda b: b / 3600.0)])
 
 
+def test_a_loss_of_the_opposite_sign_is_refused_by_its_record(card, record):
+    """A line of the card was told to be wrong."""
+    with pytest.raises(InputError, match=r"run\.csv: inverse_q is negative .* Change its sign"):
+        calibrate(card, [spoilt(record, inverse_q=lambda loss: -loss)])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("work", [lambda own, run: calibrate(own, [run]), lambda own, run: diagnose(run, card=own)])
 def test_a_bias_of_the_opposite_sign_is_refused_before_the_fit(card, work):
@@ -486,11 +492,11 @@ def test_a_jump_or_an_ageing_is_no_other_gyro(four, apart):
     assert said == []
 
 
-def late(run, hours):
+def late(run, hours, names=TEMPERATURES):
     """The same run, its temperatures logged by a clock that is so many hours behind."""
     time = run["time_s"]
     rows = (time - 3600.0 * hours >= time[0]) & (time - 3600.0 * hours <= time[-1])
-    moved = {name: np.interp(time[rows] - 3600.0 * hours, time, run[name]) for name in TEMPERATURES}
+    moved = {name: np.interp(time[rows] - 3600.0 * hours, time, run[name]) for name in names}
     columns = {name: column[rows] for name, column in run.columns.items()} | moved
     return dataclasses.replace(run, columns=columns | {"time_s": columns["time_s"] - columns["time_s"][0]})
 
@@ -502,6 +508,12 @@ def test_temperatures_of_a_clock_an_hour_off_are_named(four, k, hours, said):
         InputError, match=rf"run{k}\.csv: housing_temperature_degC is {said} frequency_Hz: moved so, one law holds"
     ):
         said_of(put(four, k, lambda run: late(run, hours)))
+
+
+def test_a_chamber_of_a_clock_an_hour_off_is_named(four):
+    """The card was told to be wrong in its conductance to the housing, by 17 of its deviations."""
+    with pytest.raises(InputError, match=r"run1\.csv: chamber_temperature_degC is 1 h behind housing_temperature_degC"):
+        said_of(put(four, 1, lambda run: late(run, 1, TEMPERATURES[1:])))
 
 
 @pytest.mark.parametrize("name", ["frequency_Hz", "bias_deg_per_h", TEMPERATURES[0]])
