@@ -165,20 +165,24 @@ def _check_clock(records: Sequence[Record], drive: str, output: str) -> None:
     if len(runs) < 2:
         return
     moved = [
-        (k, hours, one)
+        (k, hours, both)
         for hours in HOURS
         for k, run in enumerate(runs)
-        if (one := run.earlier(3600.0 * hours)) is not None
+        if (both := run.earlier(3600.0 * hours)) is not None
     ]
     as_read = likeliest(runs, LAW)
     if not moved or _holds_well(runs, as_read):
         return
-    tried = [likeliest([*runs[:k], one, *runs[k + 1 :]], LAW) for k, _, one in moved]
+    tried = [likeliest(_with(runs, k, one), LAW) for k, _, (one, _) in moved]
     best = _better(runs, as_read, tried, APART)
-    if best is not None and _alone(
-        [one for one, (k, *_) in zip(tried, moved, strict=True) if k != moved[best][0]], tried[best]
-    ):
-        k, hours, _ = moved[best]
+    if best is None:
+        return
+    k, hours, (_, still) = moved[best]
+    kept = _with(
+        runs, k, still
+    )  # as far as it is not the rows left out, at a start that fades, that had made the misfit
+    others = [one for one, (other, *_) in zip(tried, moved, strict=True) if other != k]
+    if _better(kept, likeliest(kept, LAW), [tried[best]], APART) is not None and _alone(others, tried[best]):
         raise InputError(
             f"{_path(records, members[k])}: {drive} is {abs(hours)} h {'behind' if hours > 0 else 'ahead of'} {output}:"
             " moved so, one law holds in all runs. Were they logged by two clocks? Move one of the columns in time, or leave the record out."
@@ -216,7 +220,11 @@ def _drive_of(records: Sequence[Record]) -> str:
 
 def _put_in(runs: Sequence[Course], others: Sequence[Course]) -> list[list[Course]]:
     """Return the runs with another in the place of each in turn."""
-    return [[*runs[:k], other, *runs[k + 1 :]] for k, other in enumerate(others)]
+    return [_with(runs, k, other) for k, other in enumerate(others)]
+
+
+def _with(runs: Sequence[Course], k: int, other: Course) -> list[Course]:
+    return [*runs[:k], other, *runs[k + 1 :]]
 
 
 def _white(runs: Sequence[Course]) -> float:

@@ -34,14 +34,15 @@ class Course:
             self._behind[lags] = found[1:]
         return self._behind[lags]
 
-    def earlier(self, by: float) -> "Course | None":
-        """Return the course with what is followed read later by `by` s, as if it had been logged so late; None where too little is left."""
+    def earlier(self, by: float) -> "tuple[Course, Course] | None":
+        """Return the course with what is followed read later by `by` s, as if it had been logged so late, and the same rows as they are; None where these are too few."""
         then = self.time + by
         both = (then >= self.time[0]) & (then <= self.time[-1])
         if np.count_nonzero(both) < max(FEWEST, self.time.size // 3):
             return None
-        time = self.time[both]
-        return Course(time - time[0], np.interp(then[both], self.time, self.drive), self.output[both])
+        time, output = self.time[both] - self.time[both][0], self.output[both]
+        drives = np.interp(then[both], self.time, self.drive), self.drive[both]
+        return Course(time, drives[0], output), Course(time, drives[1], output)
 
 
 @dataclass(frozen=True)
