@@ -8,7 +8,7 @@ linear in S, along the temperatures that `thermal.sweeping` has found: solved in
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,9 +18,10 @@ from thermal.network import Array, Network
 from thermal.profile import Profile
 from thermal.steady import first_steady_state
 from thermal.sweeping import Sweep, capacity_ratio, hermite, hold, run_sweeps
-from thermal.transient import BLOCK
+from thermal.transient import BLOCK, Transient, propagate
 
 TWO = (293.15, 303.15)  # K, where a capacity that changes shows it
+AROUND = 300.0  # K, a temperature at which all is at rest, about which changes are propagated: these are above 0 K
 CAPACITY_STEP = 0.5  # K, half the central difference of a capacity over temperature
 
 
@@ -103,24 +104,29 @@ def respond(
 def _observe(swept: Sweep, boundaries: Mapping[str, Profile], rows: Array, weights: Array) -> tuple[Array, Array]:
     """Sums and rates: of T₁ from its equation, of δ from its cubics."""
     linear, grid = swept.linear, swept.grid
-    n = linear.count
-    drain = linear.conduction[:n] / swept.grid.modes.capacity[:, None]
-    first = swept.first.observe(rows, np.vstack([weights, -weights @ drain[:, :n]]))
-    count = len(weights)
-    T, rate = first[:, :count], first[:, count:]
-    held = np.column_stack([boundaries[b.name].at(rows) for b in linear.boundaries])
-    rate = rate - held @ (weights @ drain[:, n:]).T
+    T, rate = _observe_first(swept, swept.first, boundaries, rows, weights)
     varies = any(isinstance(source.power, Profile) for source in linear.sources)
     rate = rate + (linear.power(rows if varies else rows[:1]) / grid.modes.capacity) @ weights.T
     delta, delta_rate = hermite(grid, rows, swept.beyond @ weights.T, swept.beyond_rate @ weights.T)
     return T + delta, rate + delta_rate
 
 
+def _observe_first(
+    swept: Sweep, first: Transient, boundaries: Mapping[str, Profile], rows: Array, weights: Array
+) -> tuple[Array, Array]:
+    """Sums and rates of what the linear network answers to its boundaries alone."""
+    n, count = swept.linear.count, len(weights)
+    drain = swept.linear.conduction[:n] / swept.grid.modes.capacity[:, None]
+    both = first.observe(rows, np.vstack([weights, -weights @ drain[:, :n]]))
+    held = np.column_stack([boundaries[b.name].at(rows) for b in swept.linear.boundaries])
+    return both[:, :count], both[:, count:] - held @ (weights @ drain[:, n:]).T
+
+
 class _Slopes:
     """Derivatives at all moments of the grid, found by sweeping."""
 
     def __init__(self, swept: Sweep, steady: Array, changes: Sequence[NetworkChange]) -> None:
-        self.swept = swept
+        self.swept, self.changes = swept, changes
         network, linear = swept.network, swept.linear
         n = self.count = network.count
         everything = swept.everything
@@ -132,20 +138,33 @@ class _Slopes:
             warm, cold = (capacity_ratio(network, linear, everything + d) for d in (CAPACITY_STEP, -CAPACITY_STEP))
             self.log_slope = (np.log(cold) - np.log(warm)) / (2 * CAPACITY_STEP)  # d ln C/dT
         held = np.stack([self._hold(change) for change in changes], axis=2)
-        forcing = np.stack([self._force(change) for change in changes], axis=2) - held @ linear.conduction[n:, :n]
+        forcing = np.stack([self._force(change) for change in changes], axis=2)
         start = np.stack([_initial_slope(network, steady, change) for change in changes])
-        # what departs at the start may fade within a part of an interval: so far as the network is linear, it fades by its modes
-        modes, departures = swept.grid.modes, [np.zeros(n) if one.initial is None else one.initial for one in changes]
-        self.departing = (np.stack(departures) * modes.capacity) @ modes.shapes
-        fading = self.departing * self._faded(swept.grid.moments)[:, :, None] @ modes.shapes.T
+        # what departs at the start, and what a boundary does, may be over within a part of an interval
+        self.first = [self._answer_first(change, own) for change, own in zip(changes, start, strict=True)]
+        answered = np.zeros_like(forcing)
+        for k, first in enumerate(self.first):
+            if first is not None:
+                answered[:, :, k] = [first.evaluate(t) - AROUND for t in swept.grid.moments]
+                start[k] = 0.0
         feedback = self._feedback()
-        forcing += np.concatenate([fading, held], axis=3) @ feedback
+        forcing += np.concatenate([answered, held], axis=3) @ feedback
         self.modes, self.mode_rates = swept.grid.answer_with(forcing, feedback[:, :, :n], start)
 
-    def _faded(self, time: Array) -> Array:
-        """What is left of the modes since the start, (..., n)."""
-        grid = self.swept.grid
-        return np.asarray(np.exp(-(time - grid.knots[0])[..., None] / grid.modes.time_constants))
+    def _answer_first(self, change: NetworkChange, start: Array) -> Transient | None:
+        """Return what the linear network answers to boundaries and a start that change, exactly: about a temperature at rest."""
+        if not change.boundaries and change.initial is None:
+            return None
+        silent = replace(self.swept.linear, sources=())
+        return propagate(
+            silent, self._about(change), AROUND + start + (0.0 if change.initial is None else change.initial)
+        )
+
+    def _about(self, change: NetworkChange) -> dict[str, Profile]:
+        """Return the boundaries of the change, about a temperature at rest."""
+        ends = self.swept.grid.knots[[0, -1]]
+        moved = {name: Profile(own.time, AROUND + own.value) for name, own in change.boundaries.items()}
+        return {b.name: Profile(ends, np.full(2, AROUND)) for b in self.swept.network.boundaries} | moved
 
     def _hold(self, change: NetworkChange) -> Array:
         """Changes of the boundaries at all moments, (3, K, boundaries)."""
@@ -187,11 +206,12 @@ class _Slopes:
         sums = (weights @ modes.shapes).T
         both = hermite(self.swept.grid, rows, self.modes @ sums, self.mode_rates @ sums)
         slope, rate = (np.moveaxis(own, 1, 0) for own in both)
-        for k, begin in enumerate(self.departing):
-            if begin.any():
-                seen, left = begin[:, None] * sums, self._faded(rows)
-                slope[k] += left @ seen
-                rate[k] -= left @ (seen / modes.time_constants[:, None])
+        for k, first in enumerate(self.first):
+            if first is not None:
+                at_rest = AROUND * weights.sum(axis=1)
+                T, dT = _observe_first(self.swept, first, self._about(self.changes[k]), rows, weights)
+                slope[k] += T - at_rest
+                rate[k] += dT
         return slope, rate
 
 

@@ -14,7 +14,8 @@ from compensation.spikes import find_spikes
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.record import TABLE_COLUMNS, Record, Run, place_in_time, read_frequency_table, reading_resolution
-from studies.simulation.drive import COLUMN, Drive, bridge_holes, drive_by_record
+from studies.simulation.drive import COLUMN, Drive, drive_by_record
+from studies.simulation.holes import PARTS
 
 Rows = NDArray[np.intp]
 RESPONSES = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
@@ -192,10 +193,6 @@ def _observe(record: Record, start: float, named: Sequence[str], turning: bool, 
         )
     centre = time + 0.5 * float(np.median(np.diff(record["time_s"]))) if turning else time
     inner = replace(drive_by_record(record, time=np.minimum(centre, record["time_s"][-1])), start=start)
-    holes: dict[int, float] = {}
-    if inner.boundary == "housing":
-        profile, holes = bridge_holes(inner.profile)
-        inner = replace(inner, profile=profile)
     outer = None
     if inner.boundary == "housing" and COLUMN["chamber"] in record and np.isfinite(record[COLUMN["chamber"]]).sum() > 1:
         outer = replace(drive_by_record(record, "chamber", time=time), start=start)
@@ -205,7 +202,9 @@ def _observe(record: Record, start: float, named: Sequence[str], turning: bool, 
     }
     if not any(name in responses for name in named):
         raise InputError(f"{record.path}: none of {', '.join(named)} has values; there is nothing to calibrate with.")
-    return ObservedRun(record, inner, outer, responses, holes if outer is None else _find_kinks(inner, outer) | holes)
+    kinks = {} if outer is None else _find_kinks(inner, outer)
+    kinks |= {k + part: size for k, size in inner.holes.items() for part in range(PARTS)}
+    return ObservedRun(record, inner, outer, responses, kinks)
 
 
 def _check_holes(record: Record) -> None:

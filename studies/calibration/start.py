@@ -21,6 +21,7 @@ from studies.errors import InputError
 from studies.record import Record, read_record
 from studies.simulation.chamber import is_record
 from studies.simulation.drive import Drive
+from studies.simulation.holes import straight
 from studies.simulation.prediction import predict
 
 if TYPE_CHECKING:
@@ -56,8 +57,21 @@ def misread(instrument: "Instrument", predicted: "Prediction", law: "FrequencyLa
     drive, read = predicted.drive, predicted.drive.profile.value
     noise = white_rms(read) if drive.boundary == "housing" else 0.0
     draw = np.append(0.0, np.random.default_rng(0).standard_normal(len(read) - 1))
-    drawn = replace(drive, profile=replace(drive.profile, value=read + noise * draw))
-    return {c: own - predicted.columns[c] for c, own in predict(instrument, drawn, law=law).columns.items()}
+    return _otherwise(instrument, predicted, replace(drive.profile, value=read + noise * draw), law)
+
+
+def unrecorded(instrument: "Instrument", predicted: "Prediction", law: "FrequencyLaw") -> dict[str, Array]:
+    """Return what straight lines over the holes of a record that drives a run, for its curves, change in every column."""
+    drive = predicted.drive
+    return _otherwise(instrument, predicted, straight(drive.profile, drive.holes), law) if drive.holes else {}
+
+
+def _otherwise(
+    instrument: "Instrument", predicted: "Prediction", profile: "Profile", law: "FrequencyLaw"
+) -> dict[str, Array]:
+    """Return what another profile changes in every column."""
+    found = predict(instrument, replace(predicted.drive, profile=profile), law=law).columns
+    return {c: own - predicted.columns[c] for c, own in found.items()}
 
 
 def begin(

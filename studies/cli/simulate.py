@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from compensation.arrays import Array
 from studies.calibration.ahead import spread_of_prediction
-from studies.calibration.start import begin, misread
+from studies.calibration.start import begin, misread, unrecorded
 from studies.cli.arguments import POSITIVE, PROFILE, Card, Out, Seed, Theory
 from studies.cli.output import answers, keep_record, say
 from studies.instrument.card import load_card
@@ -23,7 +23,7 @@ DRIVES = (
 )
 
 UNCERTAINTY = "Uncertainty of the prediction (standard deviation, rms over the run)"
-SPREAD = "0: column | 1: in all .3 | 2: by its start .3 | 3: by noise of the housing's readings .3"
+SPREAD = "0: column | 1: in all .3 | 2: by its start .3 | 3: by noise of the housing's readings .3 | 4: by holes of the record .3"
 BEGUN = "How the run began: departures from having settled"
 DEPARTURES = "0: part | 1: departure (K) .3 | 2: standard deviation (K) .3"
 
@@ -55,7 +55,7 @@ def simulate(
         row: Time between rows in s; a record keeps its rows.
         noiseless: Leave out noise, sensor lag and rounding.
         boundary: Column of a record that is imposed: chamber or housing.
-        spread: Show the standard deviation of every column due to the uncertainties of the card, how the run of a record began, the noise of its temperatures and, as a calibration found it, the level of a run, without noise of the column.
+        spread: Show the standard deviation of every column due to the uncertainties of the card, how the run of a record began, the noise of its temperatures, curves over its holes and, as a calibration found it, the level of a run, without noise of the column.
         start: Time of a record (30min, 2h) whose readings tell how its gyro began; else it begins settled at the first temperature.
     """
     instrument = load_card(card)
@@ -72,8 +72,9 @@ def simulate(
         by_card = spread_of_prediction(instrument, run.prediction.drive, run.law)
         by_start = begun.spread(instrument, run.prediction.drive, run.law) if begun else {}
         by_readings = misread(instrument, run.prediction, run.law) if begun else {}
+        by_holes = unrecorded(instrument, run.prediction, run.law)
         for name in [name for name in by_card if name in run.record]:
-            alone, *parts = (_rms(own.get(name, 0.0)) for own in (by_card, by_start, by_readings))
+            alone, *parts = (_rms(own.get(name, 0.0)) for own in (by_card, by_start, by_readings, by_holes))
             widths.append((name, float(np.linalg.norm([alone, *parts])), *parts))
     summary = {
         "card": instrument.name,

@@ -14,6 +14,7 @@ from studies.errors import InputError
 from studies.record import Record
 from studies.record.rest import check_temperatures
 from studies.simulation.heat_path import SENSOR
+from studies.simulation.holes import bridge_holes
 from thermal.profile import Profile
 
 Boundary = Literal["chamber", "housing"]
@@ -61,8 +62,11 @@ class Drive:
     # that is known.
     jumps: Mapping[int, float] = field(default_factory=dict)
     # How far (K) the profile departs from the straight line midway between the row before and row k, by k: what a
-    # measured housing did between two rows when its chamber jumped.
+    # measured housing did between two rows when its chamber jumped, or in a hole of its record.
     kinks: Mapping[int, float] = field(default_factory=dict)
+    holes: Mapping[int, float] = field(
+        default_factory=dict
+    )  # how far it may (sd), in holes of the record, by the first row in each
 
     def __post_init__(self) -> None:
         for name in self.initial:
@@ -189,6 +193,7 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
         t, T = np.insert(t, 0, rows[0]), np.insert(T, 0, T[0])
     if t[-1] < rows[-1]:
         t, T = np.append(t, rows[-1]), np.append(T, T[-1])
+    profile, holes = bridge_holes(Profile(t, T)) if boundary == "housing" else (Profile(t, T), {})
     commands = {
         name: (_held(rows, record[column]) * factor) ** power
         for name, (column, factor, power) in COMMANDS.items()
@@ -202,9 +207,10 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     return Drive(
         rows if time is None else time,
         boundary,
-        Profile(t, T),
+        profile,
         moment=record.moment,
         commands=commands,
+        holes=holes,
         rate=turned,
         source=record.path,
     )
@@ -254,29 +260,3 @@ def _thinned(t: Array, T: Array, most: int) -> tuple[Array, Array, Array]:
     both = both[:, np.lexsort((np.concatenate([edges, sides]), both[0]))]
     t, T, width = both[:, np.concatenate([[True], np.diff(both[:2], axis=1).any(axis=0)])]
     return t, T, width
-
-
-WIDE = 3.5  # usual distances of rows, from which a hole is more than a missing row
-MOST = 8  # of a run, the widest
-PARTS = 3  # of a hole: base, stem and shell behind a housing
-LEAST = 0.02  # K, departure of a temperature that was steady on both sides
-
-
-def bridge_holes(profile: Profile) -> tuple[Profile, dict[int, float]]:
-    """Put `PARTS − 1` rows into each hole of a measured profile; return it, and by row k how far (K, sd) it may be off midway before."""
-    t, T = profile.time, profile.value
-    h = np.diff(t)
-    usual = float(np.median(h))
-    wide = np.flatnonzero(h > WIDE * usual)
-    wide = np.sort(wide[np.argsort(-h[wide], kind="stable")][:MOST])
-    departures: dict[int, float] = {}
-    inner = [np.linspace(t[k], t[k + 1], PARTS + 1)[1:-1] for k in wide]
-    for place, k in enumerate(wide):
-        near = max(int(np.ceil(h[k] / 2 / usual)), 2)
-        beside = np.ptp(T[max(k - near, 0) : k + 1]) + np.ptp(T[k + 1 : k + 2 + near])
-        size = max(0.5 * float(abs(T[k + 1] - T[k]) + beside), LEAST)
-        first = int(k) + 1 + place * (PARTS - 1)
-        departures |= {first + part: size for part in range(PARTS)}
-    times = np.sort(np.concatenate([t, *inner]), kind="stable")
-    values = np.interp(times, t, T) if wide.size else T
-    return Profile(times, values), departures

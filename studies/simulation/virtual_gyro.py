@@ -11,12 +11,14 @@ from compensation.arrays import Array
 from compensation.noise import Noise
 from shell.constants import zero_Celsius
 from studies.effects import find_effect
+from studies.errors import numbered
 from studies.instrument.tables.noise import SILENT
 from studies.progress import tell
 from studies.record import Record, check_plausible
 from studies.resonator.law import beyond_records, unknown_slope
 from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
+from studies.simulation.holes import PARTS
 from studies.simulation.loop import find_range_use, require_range, require_stable_loops, wave_of
 from studies.simulation.noise import bias_noise, frequency_noise, quantise
 from studies.simulation.prediction import Prediction, law_for, predict
@@ -138,6 +140,13 @@ def simulate_run(
     warnings = idle_effects(instrument, drive) + beyond_records(instrument, reached, "this run")
     if why := unknown_slope(instrument):
         warnings += (f"the frequency follows no temperature: {why}",)
+    if drive.holes:
+        t = drive.profile.time
+        longest, after = max((t[k + PARTS - 1] - t[k - 1], t[k - 1]) for k in drive.holes)
+        warnings += (
+            f"the housing's temperature has {numbered(len(drive.holes), 'hole')}, the longest of {longest:.3g} s after {after:.6g} s:"
+            " a smooth curve bridges it; what happened there besides is not known.",
+        )
     return VirtualRun(record, prediction, warnings)
 
 

@@ -106,6 +106,23 @@ def test_a_departure_that_fades_between_two_knots_fades_in_the_derivative():
     assert found.rate_slope[0, :, 3] == pytest.approx(-np.exp(-t / 5.0) / 5.0, abs=1e-6)
 
 
+def test_a_bump_of_a_measured_boundary_between_two_knots_acts_when_it_comes():
+    """Of one lag τ behind a boundary of many rows, that departs by a tent about s for w s to either side: T(t) = Σ w_j R(t − t_j) of ramps.
+
+    R(t) = t − τ (1 − e^(−t/τ)). Knots are 60 s apart and none is at its corners: a parabola between them once acted 40 s before the tent.
+    """
+    g, C, t = 1e-3, 0.2, np.arange(0.0, 3000.0, 5.0)
+    network = assemble([Boundary("b"), Node("n", C), Conductor("n", "b", g)])
+    measured, tau = Profile(t, 293.15 + 0.1 * np.sin(t)), C / g
+    corners = np.array([1013.0, 1085.0, 1157.0])
+    tent = Profile(np.array([t[0], *corners, t[-1]]), np.array([0.0, 0.0, 1.0, 0.0, 0.0]))
+    found = respond(network, {"b": measured}, t, np.eye(1), [no_change(network, {"b": tent})])
+    since = np.maximum(t[:, None] - corners, 0.0)
+    ramps = since - tau * (1.0 - np.exp(-since / tau))
+    assert found.slope[0, :, 0] == pytest.approx(ramps @ [1.0, -2.0, 1.0] / 72.0, abs=1e-10)
+    assert found.rate_slope[0, :, 0] == pytest.approx((1.0 - np.exp(-since / tau)) @ [1.0, -2.0, 1.0] / 72.0, abs=1e-12)
+
+
 def test_power_that_goes_with_the_temperatures_is_answered_as_sweeps_would_answer_it():
     grid = run_sweeps(build(VALUES), CHAMBER).grid
     rng = np.random.default_rng(5)
