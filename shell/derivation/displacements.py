@@ -43,7 +43,7 @@ def harmonic_displacement(shape: Displacement = AMPLITUDES) -> Displacement:
 def kinetic_energy(displacement: Displacement) -> sp.Expr:
     """Return HRG paper eq. (2): K = ½ ρ h ∫∫ (u̇² + v̇² + ẇ²) r² sin φ dθ dφ, the integral over θ done."""
     speed_squared = sum(sp.diff(component, t) ** 2 for component in displacement)
-    around = integrate_around(speed_squared)
+    around = sp.factor(integrate_around(speed_squared))
     return rho * h * r**2 / 2 * sp.Integral(around * sp.sin(phi), (phi, phi_1, phi_2))
 
 
@@ -54,4 +54,4 @@ def integrate_around(density: sp.Expr) -> sp.Expr:
     polynomial = sp.Poly(form, cosine, sine)
     if form.has(theta) or any(sum(powers) != 2 for powers in polynomial.monoms()):
         raise ValueError("the density is not a quadratic form in cos nθ and sin nθ")
-    return sp.factor(sp.pi * (polynomial.coeff_monomial(cosine**2) + polynomial.coeff_monomial(sine**2)))
+    return sp.pi * (polynomial.coeff_monomial(cosine**2) + polynomial.coeff_monomial(sine**2))

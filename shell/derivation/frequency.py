@@ -111,7 +111,7 @@ def integral_definitions() -> tuple[sp.Integral, sp.Integral]:
 @cache
 def _bending_energy_density() -> sp.Expr:
     """Return the energy (7) of the mode per unit of φ, the integral over θ done."""
-    return integrate_around(surface_energy_of(mode_deformation())) * r**2 * sp.sin(phi)
+    return sp.factor(integrate_around(surface_energy_of(mode_deformation()))) * r**2 * sp.sin(phi)
 
 
 @cache
