@@ -5,7 +5,7 @@ of the design pays its prior π once:  Σ_d (S_d − π) + π. So a set that one
 could show the effect where the size that the others have would stand out from what it leaves open.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from studies.fleet.device import Standing
 
 SEEN = 2.0  # standard deviations of a limit
 LESS = 0.5  # part of the usual size below which a device lacks an effect
+NAMED = 1 / 3  # part of the devices that show a common cause whose own diagnosis names it
 FEW = 0.1  # part of the devices that could show an effect which is an exception
 Scores = Mapping[str, Mapping[str, Standing]]
 
@@ -42,8 +43,13 @@ class Share:
         return (self.effect, *self.equivalent)
 
 
-def compare(response: str, scores: Scores, batches: Mapping[str, str] | None = None) -> Share | None:
-    """Return the likeliest cause in one place of the lot; None where there is none. `scores`: device -> effect -> how it stands there."""
+def compare(
+    response: str, scores: Scores, batches: Mapping[str, str] | None = None, named: Container[str] | None = None
+) -> Share | None:
+    """Return the likeliest cause in one place of the lot; None where there is none. `scores`: device -> effect -> how it stands there.
+
+    It is common only where a part of the devices are `named` to have it by themselves: what all their models lack adds up as well.
+    """
     prior, batches = CONSTANTS["log_prior_effect"], batches or {}
     names = sorted({name for of in scores.values() for name in of})
 
@@ -66,6 +72,8 @@ def compare(response: str, scores: Scores, batches: Mapping[str, str] | None = N
         if d not in shown and effect in of and of[effect].size + SEEN * of[effect].sd < LESS * usual
     ]
     kind, odd, batch = _place(effect, shown, lacking, batches)
+    if kind != "few" and named is not None and sum(d in named for d in shown) < max(2.0, NAMED * len(shown)):
+        kind, odd, batch = "some", [], ""
     if kind == "few":  # one exception in many devices must be clearer than what a search of so many finds
         odd = [d for d in odd if scores[d][effect].score > CONSTANTS["margin"] + np.log(len(scores))]
     sizes = {d: scores[d][effect] for d in shown}

@@ -11,7 +11,7 @@ import numpy as np
 from studies.fleet.comparison import Share, compare
 from studies.fleet.device import Answer, Measured, Standing, interval
 from studies.fleet.folder import Device
-from studies.fleet.population import FEWEST, Quantity, Scatters
+from studies.fleet.population import FEWEST, Quantity, Scatters, Trend
 from studies.instrument.display import display_name, spell_parameter
 from studies.results import row_of
 
@@ -67,6 +67,11 @@ class Lot:
                 )
         return out
 
+    @cached_property
+    def trends(self) -> dict[str, Trend]:
+        """How values change with the date of the devices, where that is not chance."""
+        return {one.name: found for one in self.quantities if (found := one.trend(self.made)) is not None}
+
     def as_dict(self) -> dict[str, Any]:
         """Return the object of `hrg fleet --json`."""
         return {
@@ -74,7 +79,7 @@ class Lot:
             "odd": self.odd,
             "bad_batches": self.bad_batches,
             "common_causes": [_cause(one) for one in self.shares],
-            "values": [_value(one) for one in self.quantities],
+            "values": [_value(one, self.trends.get(one.name)) for one in self.quantities],
             "devices": {
                 serial: {
                     **one.verdict,
@@ -98,10 +103,11 @@ def _cause(one: Share) -> dict[str, Any]:
     return row | {"batch": one.batch or None, "coefficient": next(iter(one.sizes.values())).coefficient, "sizes": sizes}
 
 
-def _value(one: Quantity) -> dict[str, Any]:
+def _value(one: Quantity, trend: Trend | None) -> dict[str, Any]:
     return {
         **row_of(one, "name", "odd", "bad_batches", mean="population.mean", mean_sd="population.mean_sd"),
         "scatter": one.population.scatter,
+        "per_30_days": trend and interval(trend.per_month, trend.sd),
         "devices": {serial: interval(own.value, own.sd) for serial, own in one.of.items()},
         "with_lot": {s: interval(own.value, own.sd) for s in one.of for own in [one.with_lot(s)]},
     }
@@ -145,10 +151,17 @@ def _shares(answers: Mapping[str, Answer], batches: Mapping[str, str]) -> tuple[
     shares = []
     for response, names in _places(answers):
         scores = {serial: _standing_there(one.standings.get(response, {}), names) for serial, one in answers.items()}
-        share = compare(response, {s: of for s, of in scores.items() if of}, batches)
+        named = {serial for serial, one in answers.items() if names & _named(one, response)}
+        share = compare(response, {s: of for s, of in scores.items() if of}, batches, named)
         if share is not None:
             shares.append(share)
     return tuple(sorted(shares, key=lambda one: -one.evidence))
+
+
+def _named(own: Answer, response: str) -> set[str]:
+    """Return the effects that the diagnosis of one device names in a response."""
+    causes = [one for one in own.verdict["causes"] if one["response"] == response]
+    return {name for one in causes for name in (one["effect"], *one["equivalent"])}
 
 
 def _standing_there(standings: Mapping[str, Mapping[str, Standing]], names: set[str]) -> dict[str, Standing]:

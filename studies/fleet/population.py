@@ -6,7 +6,7 @@
 the restricted likelihood (Patterson & Thompson 1971, Biometrika 58, 545), with the prior 1/(τ + s̄): where the s_d are small, what the
 others predict of a device is Student's t of n − 1 degrees of freedom (Jeffreys). In general it is the mean over τ of
 N(μ, τ² + s_d² + 1/Σw), and likewise for the mean of a batch. A chance counts as many times as there were devices, or batches, and values
-to look at.
+to look at. A trend with the date of the devices is a straight line, weighted by w_d.
 
 Of a few devices that is too little: of five one has to be 20 scatters away. But a lot has many values, and ln τ of each, over what the
 card leaves it, is like those of the others: N(m, v²), with m and v as likely as the other values of the other devices make them (variances
@@ -15,6 +15,7 @@ of many quantities from few samples each: Smyth 2004, Stat. Appl. Genet. Mol. Bi
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from datetime import date
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +30,7 @@ CHANCE = 0.01  # chance, with all looks counted, below which a device or a batch
 CENTRES, WIDTHS = np.linspace(np.log(1e-5), np.log(1e2), 33), np.array([0.35, 0.7, 1.4, 2.8])
 """Values of m and v that are tried."""
 FEWEST = 4  # devices from which on values tell who is odd
+DATES, MONTH = 5, 30.0  # dates from which on a lot may have a trend, and days of which it is told
 CLEAR = 2.0  # scatter of the others, beyond which a batch is more than another batch
 
 
@@ -110,6 +112,15 @@ class Scatters:
 
 
 @dataclass(frozen=True)
+class Trend:
+    """Change of a value in `MONTH` days of the date of a device, its standard deviation, and the counted chance of such a change."""
+
+    per_month: float
+    sd: float
+    chance: float
+
+
+@dataclass(frozen=True)
 class Quantity:
     """One value over the lot."""
 
@@ -154,6 +165,21 @@ class Quantity:
             apart = abs(self.among(own).mean - others.mean)
             chances.append(others.surprise(value, sd) if apart > CLEAR * others.scatter else 1.0)
         return min(1.0, max(chances) * self.looks * len(set(self.batches.values())) / len(self.of))
+
+    def trend(self, made: Mapping[str, date]) -> "Trend | None":
+        """Return the change with the dates of the usual devices, weighted as for their mean; None where the counted chance is not small."""
+        own = [s for s in self._usual(self.odd) if s in made]
+        days = np.array([made[s].toordinal() for s in own], dtype=float)
+        if len(set(days)) < DATES:
+            return None
+        value, sd = self._arrays(own)
+        w = 1.0 / np.hypot(max(self.population.scatter, 1e-3 * float(sd.max())), sd)
+        X = np.column_stack([np.ones_like(days), (days - days.mean()) / MONTH]) * w[:, None]
+        (_, slope), (left, *_), *_ = np.linalg.lstsq(X, value * w)
+        free = len(own) - 2
+        error = float(np.sqrt(np.linalg.inv(X.T @ X)[1, 1] * left / free))
+        chance = 2.0 * float(scipy.special.stdtr(free, -abs(slope) / max(error, 1e-300))) * self.looks / len(self.of)
+        return Trend(float(slope), error, chance) if chance < CHANCE else None
 
     @property
     def odd(self) -> dict[str, float]:

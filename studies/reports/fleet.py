@@ -8,18 +8,18 @@ import numpy as np
 from compensation.constants import NINETY
 from studies.fleet.comparison import Share
 from studies.fleet.lot import Lot
-from studies.fleet.population import FEWEST, Quantity
+from studies.fleet.population import FEWEST, MONTH, Quantity, Trend
 from studies.instrument.display import spell_parameter
 from studies.reports.diagnosis import NAMES
 from studies.reports.digits import plain
 from studies.reports.style import BLUE, ORANGE, VERMILION, panels
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
 
-ACROSS, MOST, DATED, NAMED = 2, 8, 4, 25  # charts: side by side, in all, over the date; devices named below one
+ACROSS, MOST, NAMED = 2, 8, 25  # charts: side by side, in all; devices named below one
 METHOD = (
     "Each device is calibrated and diagnosed separately. The mean of a value and its scatter over the devices (normal, restricted"
     " likelihood) allow for the error of each device. A device is odd if a value so far from the others has a probability below 1 %, with"
-    " allowance for the number of devices and values examined; a batch likewise, also without its most extreme device. The evidence for each cause is summed over"
+    " allowance for the number of devices and values examined; a batch likewise, also without its most extreme device; a change with the date (a straight line) too. The evidence for each cause is summed over"
     " the devices that show it; a device counts as free of a cause only if its records could show it."
 )
 
@@ -29,6 +29,9 @@ def headline(lot: Lot) -> str:
     shared = (one for one in lot.shares if one.kind in ("all", "all but"))
     common = [f"{' or '.join(one.names)} ({NAMES[one.response]})" for one in shared]
     text = f"Common to the lot: {', '.join(common)}." if common else _of_all(lot)
+    moving = [f"{_name(one)} by {_monthly(lot.trends[one.name])}" for one in lot.quantities if one.name in lot.trends]
+    if moving:
+        text += f" In {MONTH:.0f} days of the devices' dates the lot changes: {'; '.join(moving)}."
     for name, why in lot.bad_batches.items():
         text += f" Batch {name} differs: {_first(why)}."
     if len(lot.odd) == 1:
@@ -40,6 +43,10 @@ def headline(lot: Lot) -> str:
     else:
         text += f" No device differs from the others.{_farthest(lot)}"
     return text + (f" No answer: {', '.join(sorted(lot.failed))}." if lot.failed else "")
+
+
+def _monthly(own: Trend) -> str:
+    return f"{plain(own.per_month, 2)} ± {plain(own.sd, 1)}"
 
 
 def _of_all(lot: Lot) -> str:
@@ -80,13 +87,17 @@ SHARES = (
     "evidence: evidence .3",
     Column(lambda one: _sizes(one), "sizes"),
 )
-VALUES = (
-    Column(lambda one: _name(one), "value"),
-    "population.mean ± population.mean_sd: mean | population.scatter: scatter .2",
-    Column(lambda one: len(one.of), "devices"),
-    Column(lambda one: ", ".join(f"{s} {plain(one.of[s].value)}" for s in one.odd), "odd"),
-    Column(lambda one: ", ".join(one.bad_batches), "odd batches"),
-)
+
+
+def _values(lot: Lot) -> tuple[Column | str, ...]:
+    return (
+        Column(lambda one: _name(one), "value"),
+        "population.mean ± population.mean_sd: mean | population.scatter: scatter .2",
+        Column(lambda one: _monthly(lot.trends[one.name]) if one.name in lot.trends else "", f"in {MONTH:.0f} days"),
+        Column(lambda one: len(one.of), "devices"),
+        Column(lambda one: ", ".join(f"{s} {plain(one.of[s].value)}" for s in one.odd), "odd"),
+        Column(lambda one: ", ".join(one.bad_batches), "odd batches"),
+    )
 
 
 def _sizes(one: Share) -> str:
@@ -137,16 +148,18 @@ def fleet_parts(lot: Lot, page: Callable[[str], str] | None = None) -> list[Chap
     # those first in which a device or a batch differs
     ordered = sorted(lot.quantities, key=lambda q: min([*q.odd.values(), *q.bad_batches.values()], default=1.0))
     caption = "Values with 90 % intervals in the order of the serial numbers; red: odd device, orange: odd batch; band: mean ± 3 standard deviations."
-    dated = [one for one in ordered[:DATED] if sum(s in lot.made for s in one.of) > 2]
+    dated = [
+        one for one in sorted(ordered, key=lambda q: q.name not in lot.trends) if sum(s in lot.made for s in one.of) > 2
+    ]
     charts = [
         Figure(lambda: _draw(lot, ordered[:MOST]), caption) if ordered else None,
-        Figure(lambda: _draw(lot, dated, by_date=True), "The same over the date.") if dated else None,
+        Figure(lambda: _draw(lot, dated[:MOST], by_date=True), "The same over the date.") if dated else None,
     ]
     return [
         Chapter("The lot", [
             Sentence(headline(lot), where="terminal"), Facts(facts, "page"),
             Table("Causes", lot.shares, SHARES, "Sizes: smallest and largest of the coefficient."),
-            Table("Values", ordered, VALUES, "Mean and scatter of the devices that agree with each other."),
+            Table("Values", ordered, _values(lot), "Mean and scatter of the devices that agree with each other."),
             Table("Devices without an answer", list(lot.failed.items()), "0: device | 1: why"),
         ]),
         Chapter("Control charts", charts),
