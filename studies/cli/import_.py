@@ -70,7 +70,9 @@ def _draft(raw: tuple[str, ...], path: str) -> Result:
         [
             *(Sentence(note, "note") for note in draft.notes),
             f"{path}: drafted. Mapped columns: {mapped}. Unmapped columns: {left}.",
-            "Next: read the map, correct the lines marked CHECK, then run hrg import with --map and --out.",
+            "Next: read the map, correct the lines marked CHECK, then run hrg import with --map and --out."
+            if draft.mapped
+            else "No column was recognised. Next: in the map, take the # off the blocks of columns that belong to the record and fill in 'to' and 'unit'.",
         ],
     )
 

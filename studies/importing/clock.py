@@ -12,14 +12,16 @@ from studies.errors import InputError, numbered
 from studies.files.given import shorten
 from studies.files.stored import PORTION, Stored, portions
 from studies.importing.daylight import find_change
-from studies.importing.mapping import NUMERIC_TIMES, OWN, SECONDS, UNIX, FileMap
+from studies.importing.mapping import DURATIONS, EPOCHS, LOCAL, OWN, FileMap
 from studies.importing.tables import RawTable
+from studies.importing.units import SECONDS
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
-_UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
+_1970 = datetime.datetime(1970, 1, 1)
+_LEAPS = ((2017, 1, 18), (2015, 7, 17), (2012, 7, 16), (2009, 1, 15), (2006, 1, 14), (1999, 1, 13))
+"""From when on GPS time is ahead of UTC by so many seconds."""
 _HALF_DAY = 43200.0
 _ZONE = r"(?:[Zz]|[+-]\d\d:?\d\d)$"
 LONGEST_RUN = 10 * 365.25 * 86400.0  # s
@@ -48,7 +50,7 @@ class Clock:
         self._count += table.rows
         if file.sample_period is not None:
             return np.asarray(file.sample_period * np.arange(float(self._count - table.rows), float(self._count)))
-        if form in NUMERIC_TIMES and len(file.time) > 1:
+        if file.count is not None and len(file.time) > 1:
             raise InputError(f"{table.path}: time_format = '{form}' is one column, but 'time' names {len(file.time)}.")
         if form == OWN:
             seconds, start = table.own_clock()
@@ -56,12 +58,12 @@ class Clock:
                 self._begun, self.origin = start, file.start or start
             elif self._begun is not None and start is not None:
                 seconds = seconds + (start - self._begun).total_seconds()
-        elif form in SECONDS:
-            seconds = table.numbers(file.time[0]) * SECONDS[form]
-        elif form in UNIX:
-            seconds = self._since(table.numbers(file.time[0]) * UNIX[form], _UNIX_EPOCH)
-        elif form == "excel-days":
-            seconds = self._since(table.numbers(file.time[0]) * 86400.0, _EXCEL_EPOCH)
+        elif file.count is not None:
+            size, begun = file.count
+            seconds = (table.numbers(file.time[0]) - (begun or 0.0)) * size
+            seconds = seconds if begun is None else self._since(seconds)
+        elif form in DURATIONS:
+            seconds = self._read_durations(table)
         else:
             seconds = self._read_stamps(table)
         known = seconds[np.isfinite(seconds)]
@@ -73,7 +75,7 @@ class Clock:
     def finish(self, seconds: Stored, place: Callable[[int], str], folder: str | None = None) -> Stored:
         """Place the seconds of all rows in their zone, and correct the clock."""
         file = self.file
-        if file.sample_period is None and self.form not in (*NUMERIC_TIMES, OWN) and self._first is not None:
+        if file.sample_period is None and self._first is not None:
             self.origin = self._first.to_pydatetime()
             if self._first.year == 1900:  # a pattern without a date: what strptime then supplies
                 self.origin = _combine(file.start, self._first.to_pydatetime())
@@ -81,11 +83,11 @@ class Clock:
                     many = f"{self._nights} midnights passed: a day added at each"
                     self.notes.append("a midnight passed: a day added" if self._nights == 1 else many)
         zone = file.timezone if self.origin is not None and self.origin.tzinfo is None else None
-        if zone and self.form in SECONDS and self.origin is not None:  # it has a local start only
+        if zone and file.counts_from_zero and self.origin is not None:  # it has a local start only
             self.origin = _with_offset(self.origin, self.origin.replace(tzinfo=zoneinfo.ZoneInfo(zone)).utcoffset())
             zone = None
         local = self.origin is not None and self.origin.tzinfo is None and file.sample_period is None
-        if self.origin is not None and local and not zone and self.form not in SECONDS:
+        if self.origin is not None and local and not zone and not file.counts_from_zero:
             changes = (find_change(self.origin, seconds[max(k.start - 1, 0) : k.stop]) for k in portions(len(seconds)))
             self.notes += [f"CHECK: {change[1]}" for change in changes if change]
         rate = file.clock_rate_ppm * 1e-6 if file.sample_period is None else 0.0
@@ -116,13 +118,39 @@ class Clock:
             self.notes.append(f"{file.clock_offset:g} s added to its times")
         return placed
 
-    def _since(self, seconds: Array, epoch: datetime.datetime) -> Array:
-        """Move the origin to the first whole second, so that small steps keep their digits."""
+    def _since(self, seconds: Array) -> Array:
+        """Move the origin to the first whole second after 1970, so that small steps keep their digits."""
         known = seconds[np.isfinite(seconds)]
         if self._zero is None and known.size:
             self._zero = float(np.floor(known[0])) if abs(known[0]) < 1e11 else 0.0
-            self.origin = epoch + datetime.timedelta(seconds=self._zero)
+            self.origin = _1970 + datetime.timedelta(seconds=self._zero)
+            if self.form == "gps-s":
+                ahead = next((s for year, month, s in _LEAPS if self.origin >= datetime.datetime(year, month, 1)), 0)
+                self.origin -= datetime.timedelta(seconds=ahead)
+                self.notes.append(f"GPS time is {ahead} s ahead of UTC: taken off")
+            if self.form not in LOCAL:
+                self.origin = self.origin.replace(tzinfo=datetime.UTC)
         return seconds - (self._zero or 0.0)
+
+    def _read_durations(self, table: RawTable) -> Array:
+        text = table.joined(self.file.time)
+        parts = text.str.extract(rf"^{DURATIONS[self.form]}$")
+        self._refuse_bad(table, text, np.asarray(parts[2].isna()))
+        sizes = (86400.0, 3600.0, 60.0, 1.0)
+        values = [parts[k].replace("", "0").str.replace(",", ".").astype(float) for k in range(4)]
+        known = np.asarray(parts[2].notna())
+        return np.where(
+            known, sum(size * np.nan_to_num(value) for size, value in zip(sizes, values, strict=True)), np.nan
+        )
+
+    def _refuse_bad(self, table: RawTable, text: "pd.Series[str]", unread: Array) -> None:
+        """Refuse the first cell that holds something, but no time of the form."""
+        bad = np.flatnonzero(unread & np.asarray(text != ""))
+        if len(bad):
+            raise InputError(
+                f"{table.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{' '.join(self.file.time)}' is not a time of the"
+                f" form '{self.form}'; correct time_format in the map, or end the table above with last_line; a remark between rows goes into 'missing', and an elapsed time is 'h:mm:ss'."
+            )
 
     def _read_stamps(self, table: RawTable) -> Array:
         """Parse stamps written as text; several time zones in one file are brought to UTC."""
@@ -144,12 +172,7 @@ class Clock:
             raise InputError(
                 f"{table.path}: time_format = '{self.form}' does not fit column '{name}' ({shorten(str(error))})."
             ) from None
-        bad = np.flatnonzero(np.asarray(stamps.isna()) & ~empty)
-        if len(bad):
-            raise InputError(
-                f"{table.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{name}' is not a time"
-                f" of the form '{self.form}'; correct time_format in the map, or end the table above with last_line."
-            )
+        self._refuse_bad(table, text, np.asarray(stamps.isna()))
         known = stamps.dropna()
         if self._first is None and len(known):
             self._first = known.iloc[0]
@@ -172,11 +195,12 @@ def _check_span(span: float, table: RawTable, file: FileMap) -> None:
     """Refuse times that span longer than any run, and name the units that would make a run of them."""
     if span <= LONGEST_RUN:
         return
-    unit, family = next(
-        ((factors[file.time_format], factors) for factors in (SECONDS, UNIX) if file.time_format in factors), (1.0, {})
-    )
+    size, begun = file.count or (1.0, 0.0)
+    family = {name: step for name, step in SECONDS.items() if begun is None} | {
+        name: one[0] for name, one in EPOCHS.items() if file.count and begun == one[1]
+    }
     better = [
-        f"'{name}' ({span / unit * f:.3g} s)" for name, f in family.items() if 1 < span / unit * f < LONGEST_RUN / 10
+        f"'{name}' ({span / size * f:.3g} s)" for name, f in family.items() if 1 < span / size * f < LONGEST_RUN / 10
     ]
     hint = f" time_format = {' or '.join(better)} would be possible." if better else " Check the dates."
     raise InputError(

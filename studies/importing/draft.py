@@ -7,21 +7,20 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from studies.errors import InputError
 from studies.files.given import shorten
 from studies.importing.channels import is_container, open_channels, sort_groups
 from studies.importing.daylight import find_change
 from studies.importing.draft_columns import comment_of, draft_column, draft_unknown, find_markers, guess_meanings
+from studies.importing.heading import read_heading
 from studies.importing.join import read_series, shift_between
 from studies.importing.look import Look, find_nominal, find_period, is_stamp, look_at, look_at_group
-from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
+from studies.importing.mapping import SCHEMA, TABLE_TARGETS, FileMap, ImportMap
 from studies.importing.meaning import find_meanings
 from studies.importing.notation import is_number
 from studies.importing.offset import estimate_offset
 from studies.importing.resampling import ClockedFile
-from studies.importing.timing import TIME_WORDS, find_time, parse_stamps
+from studies.importing.timing import find_time, is_time, parse_stamps, rises, since_first
 from studies.schema.keys import spell_value
 from studies.schema.reader import read_keys
 
@@ -161,7 +160,10 @@ def _one_unit(one: str, two: str) -> bool:
 
 def _draft_table(path: str) -> tuple[list[str], tuple[str, ...]] | None:
     look = look_at(path)
-    if look.header is None or any(re.search(TIME_WORDS, name.lower()) for name in look.names):
+    if look.header is None or any(
+        is_time(name, hint) or (rises(look.numbers[name]) and read_heading("time_s", hint).unit)
+        for name, hint in look.hints.items()
+    ):
         return None
     body = look.body
     above = _lines_above(look)
@@ -192,7 +194,12 @@ def _describe_notation(path: str, look: Look) -> list[str]:
         notation = look.notation
         doubt = f"    # CHECK: {comment_of(notation.doubt)}" if notation.doubt else ""
         lines += [f"separator = {spell_value(look.separator)}", f'decimal = "{notation.decimal}"{doubt}']
-        lines += [f'encoding = "{look.encoding}"']
+        guessed = (
+            ""
+            if look.encoding in ("utf-8", "utf-16", "cp1252")
+            else "    # CHECK: by the words that it makes of the headings"
+        )
+        lines += [f'encoding = "{look.encoding}"{guessed}']
         lines += [f'thousands = "{notation.thousands}"'] if notation.thousands else []
     elif look.others:
         lines += [
@@ -214,7 +221,7 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
     own = look.group.clock if look.group is not None else None
     time, form, unsure = ([], "", "") if own is not None else find_time(look, evenly=period is not None)
     lines = _describe_notation(path, look)
-    markers = find_markers(look, time)
+    markers = [*find_markers(look, time), *dict.fromkeys(look.remarks)]
     if markers:
         lines.append(f"missing = {spell_value(markers)}    # CHECK: these cells mean 'no value'")
     if time:
@@ -226,10 +233,10 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
         stated = "the lines above the table say so" if period else unsure
         lines.append(f"sample_period_s = {period or 0.0!r}    # CHECK: {stated}")
     joined = [" ".join(stamp) for stamp in zip(*(cells[name] for name in time), strict=True)]
-    stamped = time and form not in NUMERIC_TIMES and "%z" not in form
+    stamped = time and (form == "iso" or ("%" in form and "%z" not in form))
     if stamped or (own is not None and own.start is not None and own.start.tzinfo is None):
         times = parse_stamps([stamp for stamp in joined if stamp.strip()], form) if stamped else []
-        change = find_change(times[0], np.array([(t - times[0]).total_seconds() for t in times])) if times else None
+        change = find_change(*since_first(times)) if times else None
         zone, doubt = (change[0], f"; CHECK: {change[1]}") if change else ("Europe/Berlin", "")
         lines.append(f'# timezone = "{zone}"    # of local times that change between summer and winter{doubt}')
     if len(set(joined)) < len(joined):

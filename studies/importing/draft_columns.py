@@ -4,10 +4,12 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
+from studies.importing.heading import read_heading
 from studies.importing.look import Look
-from studies.importing.meaning import BRACKETED, Meaning, read_unit, say_qualified
+from studies.importing.meaning import Meaning, read_reading, say_qualified
 from studies.importing.notation import Notation, is_number
 from studies.importing.units import split_nominal, units_of
+from studies.importing.words import BRACKETED
 from studies.schema.keys import spell_value
 
 
@@ -29,27 +31,27 @@ def draft_column(
     name: str, meaning: Meaning, hint: str, numbers: Sequence[float], remark: str = "", nominal: float | None = None
 ) -> list[str]:
     """Return the entry of a column with a meaning, and what must be checked in it."""
-    target = meaning.target
-    units, (stated, factor) = units_of(target), read_unit(target, hint)
-    unit = stated or next(iter(units))
-    remark = remark or ("" if stated else "    # CHECK: the name states no unit")
+    target, stated = meaning.target, read_reading(meaning.target, hint, numbers)
+    units, unit = units_of(target), stated.unit or next(iter(units_of(target)))
+    remark = remark or ("" if stated.unit else "    # CHECK: the name states no unit")
     middle = sorted(numbers)[len(numbers) // 2]
     doubt = f"    # CHECK: {comment_of(meaning.doubt)}" if meaning.doubt else ""
     lines = [f"from = {spell_value(name)}", f'to = "{target}"{doubt}']
-    if target.endswith("_degC") and unit == "degC" and 200 < middle < 500:
+    if target.endswith("_degC") and stated.unit is None and 200 < stated.scale * middle < 500:
         unit, remark = "K", "    # CHECK: the values look like kelvin"
     lines.append(f'unit = "{unit}"{remark}')
-    if factor != 1.0:
-        either = "    # CHECK: the name states a factor, by which the reading is to be multiplied, or was"
-        lines.append(f"scale = {factor!r}" + ("    # CHECK: the factor that the name states" if factor else either))
-    if target.endswith("_degC") and abs(middle) >= 500 and factor == 1.0:
+    check = f"    # CHECK: the name says '{comment_of(stated.said)}'"
+    if stated.scale != 1.0:
+        n = read_heading(target, hint).times
+        either = f"{check}: the quantity is {1 / n:g} or {n:g} times the reading"
+        lines.append(f"scale = {stated.scale!r}" + (check if stated.scale else either))
+    if stated.offset:
+        lines.append(f"offset = {stated.offset:.10g}{check}")
+    if target.endswith("_degC") and abs(middle) >= 500 and stated.scale == 1.0:
         lines += [
             "scale = 1.0     # CHECK: the values look like raw counts; reading × scale + offset is the temperature",
             "offset = 0.0    # CHECK",
         ]
-    if meaning.base and not units[unit].settings:
-        offset = meaning.base / float(units[unit].convert(1.0))
-        lines.append(f"offset = {offset!r}    # CHECK: the name takes it off")
     for key in units[unit].settings:
         nominal = next((f for one in re.findall(BRACKETED, hint) if (f := split_nominal(one)[1])), nominal)
         stated_here = key == "nominal_Hz" and nominal is not None

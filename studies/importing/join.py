@@ -21,7 +21,7 @@ from studies.importing.order import Order, rises
 from studies.importing.raw import NotPlain
 from studies.importing.resampling import ClockedFile, take_over
 from studies.importing.tables import RawTable, Rows
-from studies.record import Record, check_plausible
+from studies.record import Record, check_plausible, find_impossible
 
 SHORT = 2_000_000  # rows of a record that is held in memory
 LARGEST = 50_000_000  # rows of a regular grid
@@ -149,14 +149,15 @@ def _read_columns(paths: Sequence[str], file: FileMap, folder: str | None, plain
                     time.append(clock.read(table))
                 found: Counter[tuple[int, str]] = Counter()
                 for column in file.columns:
-                    values, zeros = convert(table, column)
+                    values, zeros, impossible = convert(table, column)
                     columns[column.target, column.axis].append(values)
                     found[0, column.source] = table.overloads[column.source]
                     found[1, column.source] += zeros
+                    found[2, column.source] += impossible
                 counts.update(found)
     except NotPlain:
         return _read_columns(paths, file, folder, plain=False)
-    kinds = "an instrument's overload", "0, a dropout"
+    kinds = "an instrument's overload", "0, a dropout", "impossible"
     return _Columns(rows, clock, time, columns, [
         f"{numbered(n, 'reading')} of '{name}' {'is' if n == 1 else 'are'} {kinds[kind]}: left empty"
         for (kind, name), n in sorted(counts.items(), key=lambda one: one[0][0])
@@ -199,16 +200,19 @@ def _name_clock(file: FileMap) -> str:
     return f"from '{' '.join(file.time)}' ({file.time_format})"
 
 
-def convert(table: RawTable, column: ColumnMap) -> tuple[Array, int]:
-    """Return a raw column in the unit of the record, sign × unit(reading × scale + offset), and how many readings of 0 are none."""
+def convert(table: RawTable, column: ColumnMap) -> tuple[Array, int, int]:
+    """Return a raw column in the unit of the record, sign × unit(reading × scale + offset), and how many readings of 0 and impossible ones are none."""
     reading, zeros = np.asarray(table.numbers(column.source) * column.scale + column.offset), 0
     if column.conversion.never_zero:
         none = reading == 0
         zeros = int(np.count_nonzero(none))
         reading[none] = np.nan
     values = column.sign * column.conversion.convert(reading, *column.settings)
-    check_plausible({column.target: values}, lambda row: f"{table.place(row)}, '{column.source}'")
-    return np.asarray(values, dtype=float), zeros
+    wrong = find_impossible(column.target, values) if "impossible" in column.drop else np.zeros(0, dtype=bool)
+    values[: wrong.size][wrong] = np.nan
+    mend = "make it missing by drop = ['impossible'] of the column in the map"
+    check_plausible({column.target: values}, lambda row: f"{table.place(row)}, '{column.source}'", mend)
+    return np.asarray(values, dtype=float), zeros, int(np.count_nonzero(wrong))
 
 
 def _lay_grid(base: ClockedFile, import_map: LoadedMap, folder: str | None) -> Stored:

@@ -2,6 +2,7 @@
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,12 +15,16 @@ from studies.importing.meaning import looks_likely
 from studies.importing.notation import Notation, find_notation, is_number, is_unit, unit_of
 from studies.importing.raw import decode, name_columns, read_filled, split_line
 from studies.importing.sheets import EXCEL, read_sheets
+from studies.importing.words import ENGLISH
 
 SEEN = 2000  # lines that are looked at
 HEAD = 1 << 24  # bytes
 FOOT = 50  # last lines
+HEADING = 20_000  # characters in which words are looked for that tell the code page
+PAGES = ("cp1252", "cp1251", "gb18030", "cp932", "cp1250")
+WORDS = (*(pattern for _, pattern in ENGLISH), "[°µ℃]")
 STAMP = re.compile(
-    r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d{1,2}:\d{2}|\d{1,2}h\d{1,2}(m|$)|\d{1,2}[- .]+[a-z]{3}[- .]+\d{2,4}\b|\d{8}T\d{4}"
+    r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d+:\d{2}|\d+([. ]|d | days?, )\d{1,2}:\d{2}:|\d{4}年|\d{1,2}时|\d{1,2}h\d{1,2}(m|$)|\d{1,2}[- .]+[a-z]{3}[- .]+\d{2,4}\b|\d{8}T\d{4}"
     r"|(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-3])([0-5]\d){2}(\.\d+)?$",
     re.IGNORECASE,
 )
@@ -47,8 +52,13 @@ class Look:
 
     @property
     def body(self) -> list[list[str]]:
-        """The rows of the table that hold something."""
-        return [row for row in self.rows[self.data :] if any(cell.strip() for cell in row)]
+        """The rows of the table that hold something, but a remark alone."""
+        return [row for row in self.rows[self.data :] if any(map(str.strip, row)) and not _is_remark(row)]
+
+    @property
+    def remarks(self) -> list[str]:
+        """Words that stand alone on a row of the table."""
+        return [row[0].strip() for row in self.rows[self.data :] if _is_remark(row) and row[0].strip()[:1] != "#"]
 
     @cached_property
     def columns(self) -> dict[str, list[str]]:
@@ -109,14 +119,25 @@ def _find_table(rows: list[list[str]], end: Sequence[Sequence[str]], total: int)
     width = max(
         (len(row) for row, count in zip(rows, numeric, strict=True) if 2 * count >= len(row) and count), default=0
     )
-    first = next((k for k, count in enumerate(numeric) if count and 2 * count >= width), None)
-    if first is None or width < 2:
+    likely = [bool(count and 2 * count >= width) for count in numeric]
+    if not any(likely) or width < 2:
         return None
+    kinds = [tuple(map(_is_reading, row)) for row in rows]
+    usual, _ = Counter(kind for kind, own in zip(kinds, likely, strict=True) if own).most_common(1)[0]
+    first = kinds.index(usual)
+    while first and likely[first - 1]:
+        first -= 1
     named = [k for k in range(first) if sum(bool(cell.strip()) for cell in rows[k]) >= max(1, width - 1)]
     # of two lines with a cell for every column the second one holds the units
     header = named[-2] if len(named) > 1 and _is_unit_line(rows[named[-1]]) else named[-1] if named else None
     last = _last_line(rows[first], end, total)
     return Look("", "", rows[:last], header, first, last=last)
+
+
+def _is_remark(row: Sequence[str]) -> bool:
+    """Tell whether a row holds words in its first cell alone, or behind a #."""
+    first, *others = [cell.strip() for cell in row] or [""]
+    return first[:1] == "#" or (first != "" and not any(others) and not _is_reading(first))
 
 
 def _last_line(first: Sequence[str], end: Sequence[Sequence[str]], total: int) -> int | None:
@@ -144,13 +165,18 @@ def _is_unit_line(row: Sequence[str]) -> bool:
 def _find_encoding(path: str, data: bytes) -> str:
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
-    for encoding in ("utf-8", "cp1252"):
+    known: dict[str, int] = {}
+    for encoding in ("utf-8", *PAGES):
         try:
-            decode(path, data, encoding)
+            text = decode(path, data, encoding)[:HEADING].lower()
         except InputError:
             continue
-        return encoding
-    return "latin-1"
+        if encoding == "utf-8":
+            return encoding
+        known[encoding] = sum(
+            not word.isascii() for pattern in WORDS for word in (one[0] for one in re.finditer(pattern, text))
+        )
+    return max(known, key=lambda one: known[one], default="latin-1")
 
 
 def _find_separator(lines: Sequence[str]) -> str:

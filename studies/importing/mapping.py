@@ -8,18 +8,28 @@ from typing import Annotated, Literal
 import msgspec
 
 from studies.errors import nearest
-from studies.importing.units import TARGETS, UNITS, Unit, find_spelling, split_nominal, units_of
+from studies.importing.units import SECONDS, TARGETS, UNITS, Unit, find_spelling, split_nominal, units_of
 from studies.schema.keys import Keys, number, says
 from studies.schema.reader import read_file
 
 SCHEMA = "hrg.map/1"
 SEPARATORS = {";": ";", ",": ",", "tab": "\t", "|": "|", "space": r"\s+"}
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "days": 86400.0}
-UNIX = {"unix-s": 1.0, "unix-ms": 1e-3, "unix-us": 1e-6, "unix-ns": 1e-9}
-NUMERIC_TIMES = (*SECONDS, *UNIX, "excel-days")
+EPOCHS = {
+    **{"unix-s": (1.0, 0.0), "unix-ms": (1e-3, 0.0), "unix-us": (1e-6, 0.0), "unix-ns": (1e-9, 0.0)},
+    **{"gps-s": (1.0, -315964800.0), "labview-s": (1.0, 2082844800.0), "ntp-s": (1.0, 2208988800.0)},
+    **{"excel-days": (86400.0, 25569.0), "matlab-days": (86400.0, 719529.0)},
+    **{"mjd": (86400.0, 40587.0), "jd": (86400.0, 2440587.5)},
+}
+"""Counts since an epoch: seconds of one, and the count at the beginning of 1970."""
+LOCAL = ("excel-days", "matlab-days")  # the others count from an epoch of UTC
+DURATIONS = {
+    "h:mm:ss": r"(?:(\d+)[ .]?(?:d|days?)?,?[ .])?(\d+):(\d+):(\d+(?:[.,]\d*)?)",
+    "mm:ss": r"()()(\d+):(\d+(?:[.,]\d*)?)",
+}
+"""Elapsed times of any length, as "30:15:00", "1.06:15:00" or "1 day, 6:15:00": days, hours, minutes, seconds."""
 OWN = "own"
 """The clock that a file of channels has itself."""
-TIME_FORMATS = (*NUMERIC_TIMES, "iso", OWN)
+TIME_FORMATS = (*SECONDS, *EPOCHS, *DURATIONS, "iso", OWN)
 TABLE_TARGETS = ("temperature_degC", "frequency_Hz")
 LAST = 10**9  # line
 
@@ -44,7 +54,7 @@ class ColumnMap(Keys, frozen=True, kw_only=True):
     ) = msgspec.field(name="resample", default=None)
     axis: Annotated[str, says("one record for each axis; columns without an axis go into every record")] = ""
     drop: Annotated[
-        tuple[Literal["spikes", "stuck", "zeros"], ...],
+        tuple[Literal["spikes", "stuck", "zeros", "impossible"], ...],
         says("readings that become missing values; the import counts them"),
     ] = ()
     clock_Hz: Annotated[float, number("clock that is counted, of unit period-counts", above=0.0)] | None = None
@@ -67,7 +77,7 @@ class ColumnMap(Keys, frozen=True, kw_only=True):
             if wanted and not given and not (key == "nominal_Hz" and self._nominal):
                 raise ValueError(f"the key '{key}' is missing; add it.")
         if self.scale == 0:
-            raise ValueError("scale must not be 0.")
+            raise ValueError("scale must not be 0; write the factor by which the reading is to be multiplied.")
         if abs(self.sign) != 1:
             raise ValueError(f"sign must be 1 or -1, not {self.sign:g}.")
         if self.axis and not self.axis.isalnum():
@@ -104,7 +114,10 @@ class FileMap(Keys, frozen=True, kw_only=True):
     separator: Annotated[Literal[";", ",", "tab", "|", "space"], says("between cells")] = ","
     decimal: Annotated[Literal[".", ","], says("of numbers")] = "."
     thousands: Annotated[Literal["", ".", ",", "'", " "], says("between groups of three digits")] = ""
-    encoding: Annotated[Literal["utf-8", "utf-16", "cp1252", "latin-1"], says("of the file")] = "utf-8"
+    encoding: Annotated[
+        Literal["utf-8", "utf-16", "cp1252", "latin-1", "cp1250", "cp1251", "gb18030", "cp932"],
+        says("of the file; gb18030 reads GBK, cp932 Shift-JIS"),
+    ] = "utf-8"
     header_line: Annotated[int, number("with column names; 0: 'column 1', 'column 2', ...", least=0, most=LAST)] = 1
     first_line: (
         Annotated[int, number("first line with numbers; the one after the header unless given", least=1, most=LAST)]
@@ -122,7 +135,11 @@ class FileMap(Keys, frozen=True, kw_only=True):
         says("column with the time; a list joins columns with a space", example="Zeit"),
     ] = msgspec.field(name="time", default=())
     time_format: Annotated[
-        str, says(f"{', '.join(TIME_FORMATS)}, or a pattern such as '%d.%m.%Y %H:%M:%S'", example="s")
+        str,
+        says(
+            f"{', '.join(TIME_FORMATS)}, a multiple such as '0.1 s', or a pattern such as '%d.%m.%Y %H:%M:%S'",
+            example="s",
+        ),
     ] = ""
     sample_period: Annotated[float, number("instead of time and time_format: evenly spaced rows", above=0.0)] | None = (
         msgspec.field(name="sample_period_s", default=None)
@@ -143,16 +160,20 @@ class FileMap(Keys, frozen=True, kw_only=True):
     longest_gap: (
         Annotated[float, number("longer gaps are not interpolated; 10 steps unless given", above=0.0)] | None
     ) = msgspec.field(name="longest_gap_s", default=None)
-    columns: Annotated[tuple[ColumnMap, ...], says("of the raw file, for the record", least=1)] = msgspec.field(
-        name="column"
+    columns: Annotated[tuple[ColumnMap, ...], says("of the raw file, for the record")] = msgspec.field(
+        name="column", default=()
     )
 
     def __post_init__(self) -> None:
         if self.sample_period is not None and (self.time or self.time_format):
             raise ValueError("sample_period_s is given; remove time and time_format.")
+        if not self.columns:
+            raise ValueError(
+                "it has no [[file.column]]. In a draft no column was recognised then: take the # off the blocks of those that belong to the record, and fill in 'to' and 'unit' (hrg keys map)."
+            )
         if self.decimal == self.thousands:
             raise ValueError(f"decimal and thousands are both '{self.decimal}'.")
-        if self.time_format and "%" not in self.time_format and self.time_format not in TIME_FORMATS:
+        if self.time_format and "%" not in self.time_format and self.time_format not in TIME_FORMATS and not self.count:
             raise ValueError(
                 f"time_format = '{self.time_format}' is unknown{nearest(self.time_format, TIME_FORMATS)} A pattern needs %,"
                 " such as '%d.%m.%Y %H:%M:%S'."
@@ -167,6 +188,23 @@ class FileMap(Keys, frozen=True, kw_only=True):
     def time(self) -> tuple[str, ...]:
         """The columns that make the time."""
         return (self.time_columns,) if isinstance(self.time_columns, str) else self.time_columns
+
+    @property
+    def count(self) -> tuple[float, float | None] | None:
+        """What a numeric time counts: seconds of one, and the count in 1970 (None: from its own zero); None of other times."""
+        number, _, unit = self.time_format.rpartition(" ")
+        if unit in EPOCHS and not number:
+            return EPOCHS[unit]
+        try:
+            size = float(number or 1) * SECONDS.get(unit, 0.0)
+        except ValueError:
+            return None
+        return (size, None) if 0 < size < float("inf") else None
+
+    @property
+    def counts_from_zero(self) -> bool:
+        """Whether its times tell no date: numbers, or elapsed times."""
+        return self.time_format in DURATIONS or (self.count is not None and self.count[1] is None)
 
     @property
     def data_line(self) -> int:

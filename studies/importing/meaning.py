@@ -6,25 +6,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.importing.notation import PRINTED
-from studies.importing.units import TARGETS, find_spelling, split_nominal, units_of
+from studies.importing.heading import Stated, read_heading
+from studies.importing.units import TARGETS
+from studies.importing.words import plain
 
 BIDS: tuple[tuple[str, str, int], ...] = (
     # (pattern in the lower-case name, column of the record, weight)
-    (r"chamber|kammer|oven|ofen|\bbath\b|\bbox|set ?point|soll|\bt set\b|ambient|umgebung|\bair\b", "chamber_temperature_degC", 6),
-    (r"housing|geh(ä|ae)use|\bcase\b|\bt case|\bbody|\bdut\b|\bdevice", "housing_temperature_degC", 6),
+    (r"chamber|oven|\bbath\b|\bbox|set ?point|\bt set\b|ambient|\bair\b", "chamber_temperature_degC", 6),
+    (r"housing|\bcase\b|\bbody|\bdut\b|\bdevice", "housing_temperature_degC", 6),
     (r"^(?=.*temp|t\b).*(reson|\b(gyro|hrg|sample|sensor)\b)", "housing_temperature_degC", 5),
     (r"temp|pt ?100\b|pt ?1000\b|thermo|ntc\b|\brtd|\bt ?(h|housing|\d)?$|^t\b", "housing_temperature_degC", 3),
     (r"temp|pt ?100\b|pt ?1000\b|thermo|ntc\b", "chamber_temperature_degC", 1),
     (r"(\bref\w*|external|counter|gps) *(freq|f\b)|(freq\w*|\bf) *(ref|external|counter|gps)", "reference_frequency_Hz", 6),
     (r"counter|period|gate", "reference_frequency_Hz", 1),
-    (r"fre(q|k)|\bf ?(0|res|drive|n?2)?\b", "frequency_Hz", 4),
+    (r"freq|\b\d?f ?(0|res|drive|n?2|half|div ?\d+)?\b", "frequency_Hz", 4),
     (r"period|gate", "frequency_Hz", 3),
-    (r"fre(q|k)", "reference_frequency_Hz", 2),
+    (r"freq", "reference_frequency_Hz", 2),
     (r"applied|\btable|command\w* *rate|stimulus|turntable", "rate_deg_per_s", 6),
     (r"bias|zero[ -]*rate|drift|\bzro", "bias_deg_per_h", 5),
-    (r"rate|omega|gyr|\b[gw][xyz]\b", "measured_rate_deg_per_s", 4),
-    (r"1/q|\binv\w* *q|^q\b|\bq[ -]*fact", "inverse_q", 5),
+    (r"rate|omega|ω|gyr|\b[gw][xyz]\b", "measured_rate_deg_per_s", 4),
+    (r"1/q|\binv\w* *q|^q\b|\bq[ -]*fact|quality", "inverse_q", 5),
     (r"quad", "quadrature_V", 5),
     (r"\bdrive|\bampl", "drive_amplitude_V", 4),
     (r"electrode|polari[sz]|\btrim", "electrode_bias_V", 5),
@@ -33,69 +34,46 @@ BIDS: tuple[tuple[str, str, int], ...] = (
     (r"(?=.*pick ?-?off)(?=.*(\bx\b|cos|\b1\b|\ba\b))", "pickoff_cos_V", 6),
     (r"(?=.*pick ?-?off)(?=.*(\by\b|sin|\b2\b|\bb\b))", "pickoff_sin_V", 6),
 )  # fmt: skip
-KINDS = re.compile(r"(temp|thermo|^t\b)|fre[qk]")
+KINDS = re.compile(r"(temp|thermo|^t\b)|freq")
 """Words that leave only columns of one kind; of two the last one says what a column is."""
 QUALIFIERS: tuple[tuple[str, int, str], ...] = (
     # (pattern in the lower-case name, what it takes off the weight, columns that it says nothing against)
     (r"\b(sd|std|sigma|σ|var(iance)?|unc|adev|allan|psd|snr|noise)\b|stabil|uncert|st\w* ?(dev|abw)|streuung|unsicherheit|rausch|toleran|±", 99, ""),
     (r"\berr(ors?)?\b|fehler|residu", 99, "quad"),
-    (r"deviation|\bdev\b|abweich|\bdelta|[δ∆]|\bdiff|\bshift|detun|\bminus\b|\bf\w* ?- ?f\w{0,3}\b|\boffset|\bdrift|\bchange\b|änderung", 99, "bias"),
+    (r"deviation|\bdev\b|\bdelta|[δ∆]|\brise\b|\babove\b|\brel\w*\.? to\b|\bdiff|\bshift|detun|\bminus\b|\bf\w* ?- ?f\w{0,3}\b|\boffset|\bdrift|\bchange\b|änderung", 99, "bias"),
     (r"sampling|\bsample(?!.*temp)|abtast|acqui|\blogging|\bbaud|\b(data|update|refresh|scan|frame) rate|\bodr\b", 99, ""),
     (r"\bgain|coeff|\bgradient|\bslope|\btc[fb]?\b|\bramp|(heat|cool)ing|\bstatus|\bflags?\b|\bvalid|\balarm|\block\b(?![ -]?in)|\b(id|nr|no|index|serial|number)$", 99, ""),
     (r"pressure|druck|humid|feucht|\brh\b|\bdew|\bflow|\bfan\b|\bspeed|\bdoor|va[ck]uum|(\bcurrent|\bstrom)\b(?!.*(temp|freq))|leistung|\baccel", 99, ""),
     (r"laser|\broom|\blab\b|labor|logger|\b(c|m)pu\b|\b(mcu|fpga)\b|\bpump|supply|netzteil|heater|cooler|\b[ot]cxo|\bclock\b|modulat|dither|\bbeat\b|corner|cut ?off|bandwidth|inlet|outlet", 4, ""),
-    (r"\bref(erence|erenz)?\b|cold junction", 2, "^ref"),
+    (r"\bref(erence)?\b|cold junction", 2, "^ref"),
     (r"\bboard|\bpcb|\basic\b|electronic|elektronik|\b(min|max)(imum|imal)?\b|\bpeak|\brms\b|\bfit(ted)?\b|\bmodel|predict|simul|\bcalc|theor|compens|\bcorr|nominal|\btarget", 2, ""),
-    (r"set ?p(oin)?t|soll|\bcommand|\bset\b", 2, "^rate|drive|electrode"),
+    (r"set ?p(oin)?t|\bcommand|\bset\b", 2, "^rate|drive|electrode"),
 )  # fmt: skip
-LIKELY = {"frequency_Hz": (300.0, 1e6), "_degC": (-120.0, 200.0)}
+LIKELY = {"frequency_Hz": (300.0, 1e6), "_degC": (-120.0, 200.0), "_deg_per_h": (-1e3, 1e3), "inverse_q": (1e-10, 1e-2)}
 """What columns usually hold, by the end of their names."""
+BY_UNIT = 1
+"""Weight of a unit without a word that is known, of these columns where their values are usual."""
+BY_UNITS = ("frequency_Hz", "housing_temperature_degC", "bias_deg_per_h")
 UNLIKELY = 2
 """What values that a column hardly has take off its weight."""
 CLOSE = 1
 """Weights that differ by no more leave a choice in doubt."""
-BASE = re.compile(r"\bf\w{0,8}(?:\s*\[\w+\])?\s*(?:-|minus)\s*(\d+(?:\.\d+)?)\s*(k?)(?:hz)?")
-"""A frequency from which another is counted, as in "f-4400"."""
 MEASURED, APPLIED = "measured_rate_deg_per_s", "rate_deg_per_s"
 TURNS = r"meas|mess|gyr|sens|out|ausg|omega"
 """Words of a rate that was measured; without them it may be the table's."""
 FITTING_UNIT = 2
 OWN_NAME = 100
 """Weight of a column's name in a record."""
-UNIT_WORDS: tuple[tuple[str, str], ...] = (
-    (r"period.*count|count.*period", "period-counts"),
-    (r"gate|counts?\b", "gate-counts"),
-    (r"period.*(us|µs|μs)\b|(us|µs|μs)\b.*period", "period-us"),
-    (r"period.*\bms\b", "period-ms"),
-    (r"period", "period-s"),
-    (r"1/q|inv", "1/Q"),
-    (r"^q|q[ _-]*fact", "Q"),
-    (r"counts?\b", "counts"),
-)
-"""Units that are described rather than spelled; the first that fits is taken."""
-RAISED = str.maketrans({**dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-", strict=True)), "−": "-"})
-POWERS = re.compile(r"\b10\s*(?:\^|\*\*|(?=[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]))\s*([-+−⁻\d⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
-_NUMBER = r"(1/\d+|\d+(?:\.\d+)?(?:e[+-]?\d+)?)"
-NUMBER = re.compile(rf"\s*(?:[x×*·]\s*)?{_NUMBER}\s*(?=$|[^\W\d]|°)", re.IGNORECASE)
-"""A number at the beginning of a unit."""
-BEHIND = re.compile(
-    rf"(?:\s*/|\s+in|,|\s(?=\d\S*e[+-]?\d))\s*({_NUMBER[1:-1]}(?:\s*[^\W\d][^\s\])]*)?)\s*$", re.IGNORECASE
-)
-TIMES = re.compile(r"(?<=[^\s\[(])\s*[x×*·]\s*(?:\d+(?:\.\d+)?e[+-]?\d+|0\.0*1|1000*)\b", re.IGNORECASE)
-MANY = {"k": 1e3, "thousand": 1e3, "thousands": 1e3, "m": 1e6, "mio": 1e6, "million": 1e6, "millions": 1e6}
-"""Words that stand for a factor where a number has no unit."""
-BRACKETED = r"[\[(]\s*([^\])]{1,24}?)\s*[\])]"
 AXIS = re.compile(r"^(.*?)([xyz])((?:[^a-z].*)?)$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a raw column becomes: a column of the record, the axis ("" where there is only one), what must be checked, and from which frequency it counts (Hz)."""
+    """What a raw column becomes: a column of the record, the axis ("" where there is only one), and what must be checked."""
 
     target: str
     axis: str = ""
     doubt: str = ""
-    base: float = 0.0
 
 
 def find_meanings(
@@ -127,109 +105,73 @@ def find_meanings(
             if one == target and other not in found and weight >= own[target] - CLOSE and own[target] < OWN_NAME
         ]
         rate = target == MEASURED and APPLIED not in filled and not re.search(TURNS, hints[name].lower())
-        likely = is_likely(target, hints[name], numbers[name])
-        base = find_base(hints[name]) if target == "frequency_Hz" and likely is not True else 0.0
+        likely = is_likely(target, read_heading(target, hints[name]), numbers[name])
         doubts = (
             own[best] > own[target] and f"by its name {best}, which another column fills",
             rate and f"or {APPLIED}, if it is the applied rate",
             close and f"or {', '.join(map(repr, close))}, which fits as well",
             own[target] < OWN_NAME and say_qualified(hints[name], target),
-            not base and likely is False and "its values are unusual for that",
+            likely is False and "its values are unusual for that",
+            own[target] <= BY_UNIT and "its name hardly says so",
         )
-        found[name] = Meaning(target, doubt="; ".join(str(doubt) for doubt in doubts if doubt), base=base)
+        found[name] = Meaning(target, doubt="; ".join(str(doubt) for doubt in doubts if doubt))
     return {name: found[name] for name in hints if name in found}
-
-
-def find_base(hint: str) -> float:
-    """Return the frequency (Hz) that a name such as "f-4400" takes off another; 0 where there is none."""
-    found = BASE.search(hint.translate(PRINTED).lower())
-    base = float(found[1]) * (1e3 if found[2] else 1.0) if found else 0.0
-    return base if base >= LIKELY["frequency_Hz"][0] else 0.0
 
 
 def say_qualified(hint: str, target: str = "") -> str:
     """Return that a name has words by which it is another quantity than its noun; "" where it has none."""
-    found = next((word for _, word in _qualify(_plain(hint), target, hint)), "")
+    found = next((word for _, word in _qualify(plain(hint), target, hint)), "")
     return f"its name says '{found}'" if found else ""
 
 
 def _qualify(name: str, target: str, hint: str) -> Iterator[tuple[int, str]]:
     """Yield what qualifiers take off the weight of a name for a column, with the word that says so."""
-    deviation = target.endswith("_Hz") and (read_unit(target, hint)[0] in ("ppm", "ppb") or find_base(hint) > 0)
+    stated = read_heading(target or "frequency_Hz", hint)
+    deviation = stated.offset != 0.0 or (target.endswith("_Hz") and stated.unit in ("ppm", "ppb"))
     for pattern, cost, but in QUALIFIERS:
         found = re.search(pattern, name)
         if found and not (but and re.search(but, target)) and not (deviation and "deviation" in pattern):
             yield cost, found[0].strip()
 
 
-def is_likely(target: str, hint: str, numbers: Sequence[float]) -> bool | None:
+def is_likely(target: str, stated: Stated, numbers: Sequence[float]) -> bool | None:
     """Tell whether numbers are usual in a column of the record; None where nobody can say."""
-    unit, factor = read_unit(target, hint)
     low, high = next((ends for ending, ends in LIKELY.items() if target.endswith(ending)), (-np.inf, np.inf))
-    if low == -np.inf or not numbers or factor == 0:
+    if low == -np.inf or not numbers:
         return None
-    middle = factor * sorted(numbers)[len(numbers) // 2]
-    if unit is None and target.endswith("_degC"):  # kelvin, or raw counts
-        return low <= middle < 500 or None
-    way = units_of(target)[unit or next(iter(units_of(target)))]
-    if way.settings or (way.never_zero and middle == 0):
-        return None if way.settings else False
-    return bool(low <= way.convert(np.array(middle)) <= high)
+    middle = sorted(numbers)[len(numbers) // 2]
+    if stated.unit is None and target.endswith("_degC"):  # kelvin, or raw counts
+        return low <= stated.scale * middle < 500 or None
+    value = stated.value(target, middle)
+    return None if value is None else low <= value <= high
+
+
+def read_reading(target: str, hint: str, numbers: Sequence[float]) -> Stated:
+    """Return what a heading states, where the numbers decide whether a factor multiplies or divides; scale 0 where they do not."""
+    stated = read_heading(target, hint)
+    ways = [stated.settled(scale) for scale in (stated.times, 1 / stated.times)]
+    likely = [way for way in ways if is_likely(target, way, numbers)]
+    if stated.times == 1.0:
+        return stated
+    return likely[0] if len(likely) == 1 else stated.settled(0.0)
 
 
 def looks_likely(hint: str, numbers: Sequence[float]) -> bool | None:
     """Tell whether numbers are usual in the column that a name stands for."""
     bids = _bids(hint)
-    return is_likely(max(bids, key=lambda one: bids[one]), hint, numbers) if bids else None
-
-
-def find_unit(target: str, hint: str) -> str | None:
-    """Return the unit that a name states, of those from which the column can be made."""
-    return read_unit(target, hint)[0]
-
-
-def read_unit(target: str, hint: str) -> tuple[str | None, float]:
-    """Return the unit that a name states, and the factor before it, as in "[1e6]", "(10 kHz)" or "/ 1e-9"; 0 of one that may go either way, as in "x1e6"."""
-    units = units_of(target)
-    if hint.strip().lower() == target.lower():
-        return next(iter(units)), 1.0
-    hint = BEHIND.sub(r" [\1]", POWERS.sub(r"1e\1", hint).translate(RAISED))
-    either_way = TIMES.search(hint)
-    hint = hint if either_way is None else hint[: either_way.start()] + hint[either_way.end() :]
-    stated = re.findall(BRACKETED, hint)[-1:]
-    bare = re.sub(BRACKETED, " ", hint).strip()
-    words = re.split(r"[\s_]+", bare)
-    number = NUMBER.match(stated[0]) if stated else None
-    text = stated[0][number.end() :] if stated and number else "".join(stated)
-    many = MANY if "Q" in units else {}
-    if number and not text and not re.search(r"[e./]|\d{3}", number[1], re.IGNORECASE):
-        number, text = None, stated[0]  # that of a channel
-    factor = _value(number[1]) if number else many.get(text.lower(), 1.0)
-    if factor != 1.0 and text.lower() in ("", *many):
-        hint, stated, factor = bare, [], factor * (many.get(text.lower(), 1.0) if number else 1.0)
-    texts = [text] if stated else [*(" ".join(words[k:]) for k in range(len(words))), bare.rpartition("/")[2]]
-    spelled = next(filter(None, (find_spelling(target, split_nominal(one)[0]) for one in texts)), None)
-    described = (unit for pattern, unit in UNIT_WORDS if unit in units and re.search(pattern, hint.lower()))
-    unit = spelled or next(described, None)
-    return unit, 0.0 if either_way is not None else 1.0 if stated and spelled is None else factor
-
-
-def _value(number: str) -> float:
-    over, _, under = number.partition("/")
-    return float(over) / float(under or 1)
-
-
-def _plain(hint: str) -> str:
-    """Return a name in small letters without what stands in brackets, its words apart."""
-    name = re.sub(r"[\[(][^\])]*[\])]", " ", hint.translate(PRINTED))
-    return re.sub(r"(?<=[a-z])(?=[A-Z][a-z])|[_.]", " ", name).lower()
+    best = max(bids, key=lambda one: bids[one]) if bids else ""
+    return is_likely(best, read_heading(best, hint), numbers) if bids else None
 
 
 def _weigh(hint: str, numbers: Sequence[float], group: str) -> dict[str, int]:
     """Return how well a name, its unit and its numbers fit columns of the record."""
+    known = _bids(hint, group.lower())
+    likely = {target: is_likely(target, read_heading(target, hint), numbers) for target in known or BY_UNITS}
+    if not known:  # words that nobody knows, above usual numbers in the unit of a quantity
+        return {t: BY_UNIT for t in BY_UNITS if likely[t] and read_heading(t, hint).unit and not say_qualified(hint, t)}
     return {
-        target: weight - (UNLIKELY if weight < OWN_NAME and is_likely(target, hint, numbers) is False else 0)
-        for target, weight in _bids(hint, group.lower()).items()
+        target: weight - (UNLIKELY if weight < OWN_NAME and likely[target] is False else 0)
+        for target, weight in known.items()
     }
 
 
@@ -238,7 +180,7 @@ def _bids(hint: str, group: str = "") -> dict[str, int]:
     exact = next((column for column in TARGETS if bare == column.lower().split("_")), None)
     if exact is not None:
         return {exact: OWN_NAME}
-    name, bids = _plain(hint), dict[str, int]()
+    name, bids = plain(hint), dict[str, int]()
     kind = [("_degC" if found[1] else "_Hz") for found in KINDS.finditer(name)][-1:]
     for pattern, target, weight in BIDS:
         if not re.search(pattern, name) or not target.endswith(tuple(kind) or ""):
@@ -253,11 +195,8 @@ def _bids(hint: str, group: str = "") -> dict[str, int]:
 
 def _unit_fits(target: str, hint: str) -> bool | None:
     """Tell whether the stated unit can belong to a column of the record; None where none is stated."""
-    stated = re.findall(BRACKETED, hint)
-    if stated:
-        unit, factor = read_unit(target, hint)
-        return find_unit(target, f"[{stated[-1]}]") is not None or unit == "period-counts" or factor != 1.0
-    return True if find_unit(target, hint) is not None else None
+    stated = read_heading(target, hint)
+    return False if stated.strange else True if stated.unit or stated.scale != 1.0 else None
 
 
 def _find_axes(hints: Mapping[str, str]) -> dict[str, str]:

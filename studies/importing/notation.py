@@ -7,17 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from studies.importing.units import find_spelling
+from studies.importing.words import PRINTED
 
-PRINTED = str.maketrans({"−": "-", "–": "-", "’": "'", "\u00a0": " ", "\u202f": " ", "\u2009": " "})
-"""Signs of printers and word processors, and those of keyboards."""
 EXPONENT = r"(?:[eE][+-]?\d{1,2})?"
 SHAPE = re.compile(rf"([+-]?(?:\d+(?:[.,' ]\d+)*[.,]?|[.,]\d+){EXPONENT})(?:\s*((?:[^\W\d]|[°º℃℉])\D{{0,11}}))?")
 # as columns end
-QUANTITIES = ("_degC", "_Hz", "_deg_per_h", "_deg_per_s", "_V", "_deg", "_dBm", "_dB", "_W", "_counts")
-TIMES = (
-    *((r"s|se[ck]\w*", "s"), (r"ms|milli\w*", "ms"), (r"us|micro\w*", "us"), (r"ns|nano\w*", "ns")),
-    *((r"min\w*", "min"), (r"h|hrs?|hours?|std", "h"), (r"d|days?", "days")),
-)
+QUANTITIES = ("_degC", "_Hz", "_deg_per_h", "_deg_per_s", "_V", "_deg", "_dBm", "_dB", "_W", "_counts", "time_s")
 SMOOTHER = 0.9  # of the way that readings go up and down, over their range
 
 
@@ -74,13 +69,7 @@ def _match(cell: str) -> re.Match[str] | None:
 @functools.lru_cache
 def is_unit(text: str) -> bool:
     """Tell whether a text is a unit of a record's columns or of times."""
-    return bool(find_second(text)) or any(find_spelling(one, text) for one in QUANTITIES)
-
-
-def find_second(text: str) -> str:
-    """Return the unit of time that a text spells, as a map does."""
-    plain = text.replace("µ", "u").replace("μ", "u").lower()
-    return next((unit for pattern, unit in TIMES if re.fullmatch(pattern, plain)), "")
+    return any(find_spelling(one, text) for one in QUANTITIES)
 
 
 def find_notation(

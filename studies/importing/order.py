@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from studies.errors import InputError, numbered
 from studies.files.stored import Stored, portions
-from studies.importing.mapping import SECONDS, FileMap
+from studies.importing.mapping import FileMap
 from studies.importing.tables import Rows
 
 
@@ -137,7 +137,10 @@ class Order:
 def _mend(rows: Rows, file: FileMap, row: int) -> str:
     if row in rows.begins[1:]:
         return "Give consecutive files in the order of their times; import files whose clocks restart one by one."
-    restart = "If its clock restarted, split the file there, or end it with last_line in its [[file]] of the map."
-    if file.timezone or file.time_format in SECONDS:
+    restart = (
+        "If its clock restarted, split the file there, or end it with last_line in its [[file]] of the map; if rows were"
+        " only written out of order, sort them by their time."
+    )
+    if file.timezone or file.counts_from_zero:
         return restart
     return f"{restart} If clocks changed to winter time, give 'timezone' in that [[file]]."

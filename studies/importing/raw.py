@@ -22,8 +22,8 @@ from studies.errors import InputError, numbered
 from studies.files.given import shorten
 from studies.files.numbers import ROWS_AT_ONCE, parse_portions
 from studies.files.reading import ANY_SIZE, PORTION, digest, opened
-from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
-from studies.importing.notation import find_second, pattern_of, read_number
+from studies.importing.mapping import SEPARATORS, FileMap
+from studies.importing.notation import pattern_of, read_number
 from studies.importing.sheets import EXCEL, read_sheets
 from studies.importing.tables import ParsedTable, Part, RawTable, check_column
 from studies.importing.units import find_spelling
@@ -86,7 +86,7 @@ class TextTable(RawTable):
 
     def _is_stated(self, column: str, unit: str) -> bool:
         """Tell whether what stands behind a number is the unit that the map states."""
-        if not unit or (column in self.file.time and find_second(unit) == self.file.time_format):
+        if not unit or (column in self.file.time and find_spelling("time_s", unit) == self.file.time_format):
             return True
         units = [(one.target, one.unit) for one in self.file.columns if one.source == column]
         return bool(units) and all(find_spelling(target, unit) == stated for target, stated in units)
@@ -106,11 +106,7 @@ def read_text(paths: Sequence[str | Path], file: FileMap, plain: bool = True) ->
 def read_plain(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTable]]:
     """Yield the columns' names and the next rows of a text of plain numbers; NotPlain where cells must be looked at as text."""
     simple = file.encoding == "utf-8" and file.separator != "space" and file.last_line is None and not file.thousands
-    if (
-        not simple
-        or Path(path).suffix.lower() in (*EXCEL, PACKED)
-        or (file.time and file.time_format not in NUMERIC_TIMES)
-    ):
+    if not simple or Path(path).suffix.lower() in (*EXCEL, PACKED) or (file.time and file.count is None):
         raise NotPlain
     with opened(path, ANY_SIZE) as raw:
         head = list(itertools.islice(raw, file.data_line))
@@ -304,6 +300,12 @@ def _parse_text(path: str | Path, body: _Body, file: FileMap, names: list[str]) 
                     cells = cells.fillna("")
                     if not len(cells) or (cells.index[-1] < ROWS_AT_ONCE - 1 and not cells.to_numpy().any()):
                         raise _no_rows(path, file)
+                    if file.sample_period is None:  # a remark becomes a row without a time
+                        first = cells[names[0]].str.startswith("#")
+                        used = {*file.time, *(column.source for column in file.columns)}
+                        if names[0] not in used:
+                            first &= ~cells.iloc[:, 1:].any(axis=1)
+                        cells[first] = ""
                     longer = cells.index[cells[OVERFLOW].str.strip() != ""]
                     if len(longer):
                         line = file.data_line + int(longer[0])

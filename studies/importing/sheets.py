@@ -1,5 +1,6 @@
 """Excel sheets as rows of text."""
 
+import datetime
 import importlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,6 +9,7 @@ from studies.errors import InputError, MissingEnvironment, nearest
 from studies.files.given import shorten
 
 EXCEL = (".xlsx", ".xlsm")
+MIDNIGHT = datetime.time()
 MOST_CELLS = 20_000_000
 
 
@@ -29,14 +31,21 @@ def read_sheets(path: str | Path, sheet: str = "") -> Iterator[tuple[str, list[l
                     f"{path}: its sheet '{page.title}' extends to row {page.max_row}, column {page.max_column}, more than the limit of {MOST_CELLS:,}"
                     " cells. Delete cells far from the table, or export the sheet as CSV."
                 )
-            yield page.title, [[_cell_text(value) for value in row] for row in page.iter_rows(values_only=True)]
+            rows = list(page.iter_rows(values_only=True))
+            clocks = {
+                k
+                for row in rows
+                for k, x in enumerate(row)
+                if isinstance(x, datetime.datetime) and x.time() != MIDNIGHT
+            }
+            yield page.title, [[_cell_text(value, k in clocks) for k, value in enumerate(row)] for row in rows]
     except InputError:
         raise
     except Exception as error:  # openpyxl lets errors of zip, XML and its own through, also while it reads
         raise InputError(f"{path}: not an Excel workbook that can be read ({shorten(str(error))}).") from None
 
 
-def _cell_text(value: object) -> str:
-    if value is None:
-        return ""
-    return value.isoformat(sep=" ") if hasattr(value, "isoformat") else str(value)
+def _cell_text(value: object, clock: bool) -> str:
+    """Return a cell as text; a column of dates alone, which openpyxl gives as midnights, without the time of day."""
+    value = value.date() if isinstance(value, datetime.datetime) and not clock else value
+    return "" if value is None else str(value)

@@ -6,25 +6,45 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
+from compensation.arrays import Array
+from studies.importing.daylight import find_change
+from studies.importing.heading import read_heading
 from studies.importing.look import Look, is_stamp
-from studies.importing.mapping import SECONDS
-from studies.importing.meaning import find_meanings, find_unit
-from studies.importing.notation import find_second
+from studies.importing.mapping import DURATIONS, EPOCHS
+from studies.importing.meaning import find_meanings
+from studies.importing.units import SECONDS, find_spelling
+from studies.importing.words import plain
 
 DATES = (
     *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y"),
-    *("%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d-%b-%Y", "%d %b %Y", "%d-%b-%y", "%b %d %Y"),
+    *("%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d-%b-%Y", "%d %b %Y", "%d-%b-%y", "%b %d %Y", "%Y年%m月%d日"),
 )
-CLOCKS = ("%H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S:%f", "%H:%M", "%I:%M:%S %p", "%I:%M %p", "%Hh%Mm%Ss", "%Hh%Mm", "%Hh%M")
+CLOCKS = (
+    *("%H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S:%f", "%H:%M", "%I:%M:%S %p", "%I:%M %p", "%Hh%Mm%Ss", "%Hh%Mm", "%Hh%M"),
+    *("%H.%M.%S", "%H时%M分%S秒"),
+)
 STAMPS = (*map(" ".join, itertools.product(DATES, CLOCKS)), "%Y%m%d%H%M%S", *CLOCKS)
-TIME_WORDS = (
-    r"time|epoch|unix|elapsed|zeit|date|datum|clock|stamp|uhr|^t$|^t\s*[ _/\[(]\s*([mµun]?s|min)\b|^t\s*[/\[(]\s*h\b"
+TIME_WORDS = re.compile(r"time|epoch|unix|elapsed|date|clock|stamp|^t$|^ts\b|\bm?jd\b|julian|\btow\b|^x value$")
+UNITLESS = "housing_temperature_degC"  # whose units no time has
+EPOCH_WORDS = (
+    *(("gps(?!.*week)", "gps"), ("labview|1904", "labview"), ("ntp", "ntp"), ("datenum|matlab", "matlab")),
+    *((r"\bmjd", "mjd"), (r"\bjd|julian", "jd"), ("excel|serial", "excel"), ("unix|posix|epoch", "unix")),
 )
-UNIX_BY_SIZE = ((1e9, "unix-s"), (1e12, "unix-ms"), (1e15, "unix-us"), (1e18, "unix-ns"))
-HOUSING = "housing_temperature_degC"  # whose units no time has
+YEARS = (12784, 25567)  # days from 1970 to 2005 and to 2040, between which a count since an epoch is likely
 DAY = datetime.timedelta(days=1)
-LONGEST_RUN = 1000.0  # days of a file whose times look like Excel's
+LONGEST_RUN = 1000.0  # days of a file whose times look like days
 USUAL_STEP = (1e-3, 3600.0)  # s between rows
+
+
+def is_time(name: str, hint: str) -> bool:
+    """Tell whether a heading names a time: by a word, or as t in a unit of time."""
+    if read_heading(UNITLESS, hint).unit:
+        return False
+    short = re.split(r"[\s/]+", plain(name))
+    symbol = name[:1] == "t" and short[:1] == ["t"] and len(short) <= 2 and read_heading("time_s", hint).unit
+    return bool(TIME_WORDS.search(plain(name)) or symbol)
 
 
 def find_time(look: Look, evenly: bool = False) -> tuple[list[str], str, str]:
@@ -32,36 +52,56 @@ def find_time(look: Look, evenly: bool = False) -> tuple[list[str], str, str]:
     names, hints, numbers = look.names, look.hints, look.numbers
     # the head may come again
     cells = {name: [cell for cell in own if cell != name] for name, own in look.columns.items()}
-    named = [name for name in names if re.search(TIME_WORDS, name.lower()) and not find_unit(HOUSING, hints[name])]
+    named = [name for name in names if is_time(name, hints[name])]
     named = [name for name in named if name != "T" or "t" not in names]
     stamps = [name for name in names if cells[name] and all(is_stamp(cell) for cell in cells[name] if cell)]
     stamped = [name for name in (named or stamps) if name in stamps][:2]
     if stamped:
         for columns in [stamped, stamped[:1], stamped[1:]] if len(stamped) > 1 else [stamped]:
-            form, unsure = _find_stamp(columns, cells)
+            form, unsure = _find_stamp(columns, cells, " ".join(hints[name].lower() for name in columns))
             if form:
                 return list(columns), form, unsure
         return stamped[:1], "iso", "no known form fits; write the pattern"
     meant = find_meanings(hints, numbers)  # a temperature that only rises is no clock
-    rising = [name for name in names if _rises(numbers[name]) and name not in meant]
+    rising = [name for name in names if rises(numbers[name]) and name not in meant]
     if not named and (evenly or not rising):
         return [], "", "no column is a time; by how many seconds do the rows lie apart?"
-    time = next((name for name in named if name in rising or _rises(numbers[name])), (named or rising)[0])
+    time = next((name for name in named if name in rising or rises(numbers[name])), (named or rising)[0])
     unsure = "" if named else "no column is named time; the first increasing one was taken"
-    values = numbers[time]
-    first = values[0] if values else 0.0
-    for size, form in UNIX_BY_SIZE:
-        if size <= first < 4 * size:
-            return [time], form, unsure
+    values, stated = numbers[time], read_heading("time_s", hints[time])
     words = re.findall(r"[^\W\d_]+", hints[time])
-    if unit := next(filter(None, map(find_second, reversed(words))), ""):
+    unit = stated.unit or next(filter(None, (find_spelling("time_s", word) for word in reversed(words))), "")
+    if (epoch := find_epoch(plain(time), values, SECONDS.get(unit))) and stated.scale == 1.0:
+        return [time], epoch[0], unsure or epoch[1]
+    if stated.scale != 1.0 or stated.times != 1.0:
+        unit, said = unit or "s", f"the name says '{stated.said}'"
+        return [time], unit if stated.scale == 1.0 else f"{stated.scale:g} {unit}", said
+    if unit:
         return [time], unit, unsure
-    if 40000 < first < 60000 and any(value % 1 for value in values) and values[-1] - first < LONGEST_RUN:
-        return [time], "excel-days", "the values look like Excel's days"
     return [time], _likely_unit(values), unsure or "the name states no unit; chosen by the step between rows"
 
 
-def _rises(values: Sequence[float]) -> bool:
+def find_epoch(name: str, values: Sequence[float], of: float | None) -> tuple[str, str] | None:
+    """Return the count since an epoch that a name states, or that values look like, by counts of so many seconds (None: of any), and what must be checked; None where they are none."""
+    first, last = (values[0], values[-1]) if values else (0.0, 0.0)
+    fitting = [
+        form
+        for form, (size, begun) in EPOCHS.items()
+        if of in (None, size)
+        and YEARS[0] < (first - begun) * size / 86400.0 < YEARS[1]
+        and (size < 86400.0 or (last - first < LONGEST_RUN and any(value % 1 for value in values)))
+    ]
+    word = next((start for pattern, start in EPOCH_WORDS if re.search(pattern, name)), "")
+    stated = [form for form in fitting if word and form.startswith(word)]
+    if not fitting or stated:
+        return (stated[0], "") if stated else None
+    usual = next((form for form in fitting if form.startswith(("unix", "excel"))), fitting[0])
+    others = [form for form in fitting if form != usual]
+    return usual, f"the values look like it{', or like ' + ', '.join(others) if others else ''}"
+
+
+def rises(values: Sequence[float]) -> bool:
+    """Tell whether every number is above the one before it."""
     return len(values) > 2 and all(b > a for a, b in itertools.pairwise(values))
 
 
@@ -74,18 +114,28 @@ def _likely_unit(values: Sequence[float]) -> str:
     return min(("s", "ms", "us", "ns"), key=lambda unit: abs(math.log10(max(step, 1e-300) * SECONDS[unit])))
 
 
-def _find_stamp(columns: Sequence[str], cells: Mapping[str, list[str]]) -> tuple[str, str]:
+def _find_stamp(columns: Sequence[str], cells: Mapping[str, list[str]], hint: str) -> tuple[str, str]:
     text = [stamp for row in zip(*(cells[name] for name in columns), strict=True) if (stamp := " ".join(row).strip())]
     fitting = {
         form: times for form in STAMPS if text and parse_stamps(text[:1], form) and (times := parse_stamps(text, form))
     }
+    elapsed = next((form for form, one in DURATIONS.items() if all(re.fullmatch(one, cell) for cell in text)), "")
+    named = re.search("elapsed|duration|relative|run time|mm:ss", f"{hint} {plain(hint)}") is not None
+    if elapsed and (named or not fitting):
+        return elapsed, ""
     if not fitting:
         return ("iso", "") if parse_stamps(text, "iso") else ("", "")
     spans = {form: max(times) - min(times) for form, times in fitting.items()}
-    best = min(fitting, key=lambda form: spans[form])  # of two dates the one by which the run is shorter
+    # of two dates the one by which the run is shorter, or a missing hour that of a change of clocks
+    best = min(fitting, key=lambda form: (spans[form], not find_change(*since_first(fitting[form]))))
     other = next((f for f in fitting if fitting[f] != fitting[best] and spans[f] < 2 * spans[best] + DAY), "")
     unsure = f"day and month could be exchanged; or '{other}'" if other else ""
     return best, unsure or ("no date: give 'start' to place the run in time" if best in CLOCKS else "")
+
+
+def since_first(times: Sequence[datetime.datetime]) -> tuple[datetime.datetime, Array]:
+    """Return the first of some times, and the seconds of all after it."""
+    return times[0], np.array([(t - times[0]).total_seconds() for t in times])
 
 
 def parse_stamps(text: Sequence[str], form: str) -> list[datetime.datetime]:

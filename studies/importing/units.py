@@ -74,6 +74,8 @@ _RATE_PER_S = {
 _VOLTAGE = {"V": _SAME, "mV": _times(1e-3, "x / 1000"), "uV": _times(1e-6, "x / 1e6"), "kV": _times(1e3, "1000 x")}
 _ANGLE = {"deg": _SAME, "rad": _times(180 / pi, "(180 / pi) x"), "turns": _times(360.0, "360 x")}
 
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "days": 86400.0}
+
 _BY_ENDING: Mapping[str, Mapping[str, Unit]] = {
     "_degC": _TEMPERATURE,
     "_Hz": _FREQUENCY,
@@ -85,6 +87,7 @@ _BY_ENDING: Mapping[str, Mapping[str, Unit]] = {
     "_dBm": {"dBm": _SAME},
     "_dB": {"dB": _SAME},
     "_W": {"W": _SAME, "mW": _times(1e-3, "x / 1000"), "uW": _times(1e-6, "x / 1e6")},
+    "time_s": {name: _times(size, "") for name, size in SECONDS.items()},
     "inverse_q": {
         "1/Q": _SAME,
         "Q": _over(1.0, "1 / x"),
@@ -92,7 +95,7 @@ _BY_ENDING: Mapping[str, Mapping[str, Unit]] = {
         "ppb": _times(1e-9, "x / 1e9"),
     },
 }
-UNITS = "; ".join(", ".join(units) for units in _BY_ENDING.values())
+UNITS = "; ".join(", ".join(units) for ending, units in _BY_ENDING.items() if ending != "time_s")
 
 
 def units_of(column: str) -> Mapping[str, Unit]:
@@ -100,8 +103,17 @@ def units_of(column: str) -> Mapping[str, Unit]:
     return next(units for ending, units in _BY_ENDING.items() if column.endswith(ending))
 
 
+_CYRILLIC = str.maketrans("СКГВцкградмсчине", "CKHVzkgradmshine")  # the letters of °С, К, Гц, В, град/ч, мс, мин
 _SPELLINGS = (
-    (r"degrees?|°|º", "deg"),
+    (r"^(m|milli|u|µ|μ|micro|n|nano)?(s|se[ck]\w*|秒)$", r"\1s"),
+    *(
+        (r"^mins?$|^minut\w*$|^分$", "min"),
+        (r"^(hours?|hrs?|std|stunden?|小时|時間)$", "h"),
+        (r"^(d|days?|tage?)$", "days"),
+    ),
+    (r"nano", "n"),
+    *((r"(?<=/)秒", "s"), (r"(?<=/)(小时|时)", "h")),
+    (r"degrees?|gradi?|度|°|º", "deg"),
     (r"℃|(deg)?celsius|(?-i:^C$)", "degC"),
     (r"℉|(deg)?fahrenheit|(?-i:^F$)", "degF"),
     (r"kelvin", "K"),
@@ -125,7 +137,8 @@ def find_spelling(column: str, text: str) -> str | None:
     units = units_of(column)
     if text in units:
         return text
-    plain = re.sub(r"[\s_]", "", text)
+    plain = re.sub(r"[\s_]", "", text).translate(_CYRILLIC)
+    plain = plain.lower() if column == "time_s" else plain
     for pattern, word in _SPELLINGS:
         plain = re.sub(pattern, word, plain, flags=re.IGNORECASE)
     return next((u for u in units if u.casefold() == plain.casefold() and (u[0] == plain[0] or u[0] not in "mM")), None)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from studies.errors import InputError, nearest
@@ -59,7 +60,7 @@ LIMITS = {
     "_deg_per_s": (-1e6, 1e6),
     "_V": (-1e5, 1e5),
     "_deg": (-1e9, 1e9),
-    "inverse_q": (-1e-3, 1.0),  # noise about a small value
+    "inverse_q": (-1e-3, 1e-2),  # noise about a small value
 }
 TABLE_COLUMNS = ("temperature_degC", "frequency_Hz")
 PROFILE_COLUMNS = ("time_s", "chamber_temperature_degC")
@@ -244,15 +245,25 @@ def check_plausible(
 ) -> None:
     """Refuse readings that no instrument gives, naming the first; `where` tells the place of a row."""
     for name, values in columns.items():
-        low, high = next((ends for ending, ends in LIMITS.items() if name.endswith(ending)), (-np.inf, np.inf))
-        wrong = (values < low) | (values > high)
+        wrong = find_impossible(name, values)
         if wrong.any():
+            low, high = _limits(name)
             row = int(wrong.argmax())
             kelvin = name.endswith("_degC") and 200 < values[row] < 500
             hint = "it looks like kelvin, subtract 273.15" if kelvin else "check its unit"
             raise InputError(
                 f"{where(row)}: {name} = {values[row]:g} is not a possible reading (allowed: {low:g} to {high:g}); {hint}, or {mend}."
             )
+
+
+def find_impossible(name: str, values: Array) -> NDArray[np.bool_]:
+    """Mark readings (N,) of a column that no instrument gives."""
+    low, high = _limits(name)
+    return np.asarray((values < low) | (values > high))
+
+
+def _limits(name: str) -> tuple[float, float]:
+    return next((ends for ending, ends in LIMITS.items() if name.endswith(ending)), (-np.inf, np.inf))
 
 
 def _read_notes(path: str | Path, table: Columns) -> dict[str, object]:

@@ -211,6 +211,10 @@ def simple(tmp_path, rows, extra="", column="", header="t,x"):
     [
         ("s", ["5", "6.5", "8"]),
         ("min", ["0", "0.025", "0.05"]),
+        ("0.5 s", ["0", "3", "6"]),
+        ("h:mm:ss", ["26:59:58.5", "1.03:00:00", "1 day, 3:00:01.5"]),
+        ("mm:ss", ["75:59.25", "76:00.75", "76:02,25"]),
+        ("gps-s", ["1126259462", "1126259463.5", "1126259465"]),
         ("unix-s", ["1769903880", "1769903881.5", "1769903883"]),
         ("unix-ms", ["1769903880000", "1769903881500", "1769903883000"]),
         ("excel-days", ["46053.998611111111", "46053.998628472222", "46053.998645833333"]),
@@ -220,9 +224,56 @@ def simple(tmp_path, rows, extra="", column="", header="t,x"):
     ],
 )
 def test_every_way_of_writing_time(tmp_path, form, stamps):
-    record = simple(tmp_path, [f"{stamp},{k}" for k, stamp in enumerate(stamps)], f'time_format = "{form}"')
+    record = simple(
+        tmp_path,
+        [f'"{stamp}",{k}' if "," in stamp else f"{stamp},{k}" for k, stamp in enumerate(stamps)],
+        f'time_format = "{form}"',
+    )
     expected = [0, 2, 3] if "%p" in form else [0, 1.5, 3]
     assert np.allclose(record["time_s"], expected, atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("form", "count", "start"),
+    [
+        ("gps-s", "1126259462", "2015-09-14T09:50:45+00:00"),  # GW150914, Abbott et al., PRL 116 (2016) 061102
+        ("mjd", "51544.5", "2000-01-01T12:00:00+00:00"),  # the epoch J2000.0
+        ("jd", "2451545.0", "2000-01-01T12:00:00+00:00"),
+        ("ntp-s", "2208988800", "1970-01-01T00:00:00+00:00"),  # RFC 5905
+        ("labview-s", "2082844800", "1970-01-01T00:00:00+00:00"),
+        ("matlab-days", "730486.25", "2000-01-01T06:00:00"),  # MathWorks: datenum(2000,1,1) = 730486
+        ("excel-days", "36526.25", "2000-01-01T06:00:00"),
+    ],
+)
+def test_published_epochs(tmp_path, form, count, start):
+    later = f"{float(count) + (1 if form.endswith('-s') else 1 / 86400):.9f}"
+    record = simple(tmp_path, [f"{count},1", f"{later},2"], f'time_format = "{form}"')
+    assert record.start.isoformat() == start
+    assert record["time_s"] == pytest.approx([0, 1], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "step", "form", "checked"),
+    [
+        ("GPS time (s)", 1.4567e9, 10, "gps-s", False),
+        ("LabVIEW time", 3.85e9, 10, "labview-s", False),
+        ("Time", 3.85e9, 10, "labview-s", True),
+        ("Time [s]", 1.7567e9, 10, "unix-s", True),
+        ("unix time", 1.7567e9, 10, "unix-s", False),
+        ("ts_ms", 1.7725e12, 1e4, "unix-ms", True),
+        ("datenum", 740044.34375, 1e-4, "matlab-days", False),
+        ("MJD", 61102.34375, 1e-4, "mjd", False),
+        ("JD", 2461102.84375, 1e-4, "jd", False),
+        ("Time (s)", 45000.5, 10, "s", False),  # half a day into a run
+    ],
+)
+def test_a_count_since_an_epoch_is_named_or_asked_for(tmp_path, name, first, step, form, checked):
+    """GPS and LabVIEW seconds began in 2016 and 2092, a day of MATLAB lasted a second, all without a word."""
+    rows = [f"{first + step * k:.10f},{20 + k / 8},{4432 + k / 8}" for k in range(30)]
+    text = draft_map([str(table(tmp_path, f"{name},temp [°C],freq [Hz]", rows))]).text
+    (line,) = (line for line in text.splitlines() if line.startswith("time_format"))
+    assert line.startswith(f'time_format = "{form}"')
+    assert ("CHECK" in line) == checked
 
 
 def test_times_that_repeat_or_go_back(tmp_path):
@@ -579,12 +630,12 @@ def test_names_and_units_on_two_lines_of_a_table(tmp_path):
     [
         ("bias_deg_per_h", "1e19", "is not a possible reading"),
         ("frequency_Hz", "-3", "is not a possible reading"),
-        ("inverse_q", "12", "allowed: -0.001 to 1"),
+        ("inverse_q", "0.2", "allowed: -0.001 to 0.01"),  # Q = 5
     ],
 )
 def test_what_the_reader_refuses_is_not_imported(tmp_path, header, value, part):
     """The import refuses, with the line, what a record may not hold; the reader refuses the same."""
-    rows = "".join(f"{k},{value if k == 4 else 0.5}\n" for k in range(9))
+    rows = "".join(f"{k},{value if k == 4 else 0.005}\n" for k in range(9))
     (tmp_path / "raw.csv").write_text(f"time_s,{header}\n{rows}")
     with pytest.raises(InputError, match=rf"line 6.*{part}"):
         read_record(tmp_path / "raw.csv")
@@ -645,9 +696,13 @@ def test_units_as_people_write_them(tmp_path, target, unit, reading, value):
         ("1/Q (ppb)", 'unit = "ppb"'),
         ("f/kHz", 'unit = "kHz"'),
         ("T/°C", 'unit = "degC"'),
-        ("Q x1e6", 'unit = "Q"\nscale = 0.0    # CHECK'),  # either way: 0 is refused
-        ("1/Q ×10^9", 'unit = "1/Q"\nscale = 0.0    # CHECK'),
-        ("f [Hz*1000]", 'unit = "Hz"\nscale = 0.0    # CHECK'),
+        ("Q x1e6", 'unit = "Q"\nscale = 1000000.0    # CHECK'),  # the other way no Q, 1/Q or frequency is possible
+        ("1/Q ×10^9", 'unit = "1/Q"\nscale = 1e-09    # CHECK'),
+        ("f [Hz*1000]", 'unit = "Hz"\nscale = 1000.0    # CHECK'),
+        (
+            "rate x1000 [°/s]",
+            "unit = \"deg/s\"\nscale = 0.0    # CHECK: the name says 'x1000': the quantity is 0.001 or 1000",
+        ),  # 0 is refused
         ("Temp [2]", '# to = "..."\n# unit'),  # of a channel
         ("frequency [Hz] 2", 'unit = "Hz"\n'),
     ],
@@ -664,22 +719,35 @@ def test_a_draft_takes_the_unit_in_brackets_with_its_prefix(tmp_path, name, draf
         *((name, "inverse_q", 3.5e-9) for name in ("1/Q [1e-9]", "1/Q (10⁻⁹)", "1/Q / 10^-9", "1/Q [ppb]")),
         ("f [10 kHz]", "frequency_Hz", 35e3), ("f / 1e3 Hz", "frequency_Hz", 3500.0), ("bias [0.01 °/h]", "bias_deg_per_h", 0.035),
         ("T [100 K]", "housing_temperature_degC", 350 - 273.15), ("drive amplitude (100 mV)", "drive_amplitude_V", 0.35),
+        *((name, "frequency_Hz", 7.0) for name in ("Frequency (f/2) [Hz]", "f_div2_Hz", "fhalf (Hz)", "f0/2 [Hz]")),
+        *((name, "frequency_Hz", 1.75) for name in ("2f (Hz)", "freq_2f", "second harmonic freq (Hz)", "Frequenz (doppelte) [Hz]")),
+        ("Drive frequency / 4 [Hz]", "frequency_Hz", 14.0), ("Freq (prescaler 10) [Hz]", "frequency_Hz", 35.0),
+        *((name, "inverse_q", 1 / 3.5e6) for name in ("Q x10^6", "Q_1e6")), ("Q^-1 (1e-6)", "inverse_q", 3.5e-6),
+        *((name, "bias_deg_per_h", -3.5) for name in ("-Bias (deg/h)", "Bias inverted (deg/h)", "\u2212Bias [°/h]")),
+        ("Bias (deg/h/100)", "bias_deg_per_h", 0.035), ("Bias (LSB, 0.001 deg/h per LSB)", "bias_deg_per_h", 0.0035),
+        *((name, "housing_temperature_degC", 23.5) for name in ("T case - 20 (°C)", "Tcase minus 20 °C", "Tcase [°C] (above 20 °C)", "T-293.15 K (°C)")),
+        ("-(f - 4400) [Hz]", "frequency_Hz", 4396.5), ("f - 4.4 kHz [mHz]", "frequency_Hz", 4400.0035),
+        ("Temp-1 (°C)", "housing_temperature_degC", 3.5), ("Temp - 2 [°C]", "housing_temperature_degC", 3.5),  # sensors
     ],
 )  # fmt: skip
-def test_a_factor_in_a_heading_is_read(tmp_path, name, column, value):
-    """Once "Q / 1e6" became 1/Q = 0.3, and "Q [1e6]" nothing."""
+def test_a_heading_states_factor_offset_and_sign(tmp_path, name, column, value):
+    """Each was the reading itself without a word, a frequency by a factor of 2 and 1/Q = 0.3, or nothing: the value follows from the heading."""
     raw = table(tmp_path, f"time_s;{name}", (f"{k};3.5" for k in range(30)))
     assert draft_and_import(raw, tmp_path)[column][0] == pytest.approx(value, rel=1e-12)
+    assert all(
+        "CHECK" in line for line in (tmp_path / "map.toml").read_text().splitlines() if re.match("scale|offset", line)
+    )
 
 
 @pytest.mark.parametrize(
     ("name", "form"),
-    [("t[min]", "min"), ("t / min", "min"), ("t_min", "min"), ("time_min", "min"), ("t (h)", "h"), ("time_hours", "h"), ("T_h", "")],
+    [("t[min]", "min"), ("t / min", "min"), ("t_min", "min"), ("time_min", "min"), ("t (h)", "h"), ("time_hours", "h"), ("T_h", ""),
+     ("Time (0.1 s)", "0.1 s"), ("Time [10 ms]", "10 ms"), ("t [1/50 s]", "0.02 s"), ("Время, мин", "min"), ("Zeit (0,1 s)", "0.1 s")],
 )  # fmt: skip
 def test_a_time_in_minutes_or_hours_is_seen_by_its_name(tmp_path, name, form):
     """Else a run becomes a table of settled readings, or its minutes seconds; `T_h` is a housing."""
     rows = (f"{k},{20 + k % 7},{4600 + k / 8},1" for k in range(30))
-    draft = draft_map([str(table(tmp_path, f"{name},temp,freq [Hz],x", rows))])
+    draft = draft_map([str(table(tmp_path, f'"{name}",temp,freq [Hz],x', rows))])
     drafted = tomllib.loads(draft.text)
     assert drafted["file"][0].get("time_format", "") == form
     assert ("target" in drafted) == (not form)
@@ -983,8 +1051,8 @@ def test_planted_times_beyond_a_thousand_seconds(tmp_path):
     record, checks = planted(tmp_path, head, lambda k: (german(10.0 * k + 800, 0), german(4400 + k / 10, 1)))
     assert record["time_s"].tolist() == [10.0 * k for k in range(40)]
     assert not checks
-    record, checks = planted(tmp_path, "t [s];bias", lambda k: (str(10 * k), f"{1 + k / 1e3:.3f}"))
-    assert record["bias_deg_per_h"][2] == 1.002
+    record, checks = planted(tmp_path, "t [s];quad", lambda k: (str(10 * k), f"{1 + k / 1e3:.3f}"))
+    assert record["quadrature_V"][2] == 1.002
     assert "'1.000' is read as 1; if '.' parts thousands, write decimal = ',', thousands = '.'" in checks
 
 
@@ -1017,13 +1085,13 @@ def test_a_cell_that_the_map_does_not_describe_is_refused_by_its_line(tmp_path, 
 @pytest.mark.parametrize(
     ("names", "expected", "said"),
     [
-        (("f-4400",), ("frequency_Hz",), "the name takes it off"),
+        (("f-4400",), ("frequency_Hz",), "the name says '-4400'"),
         (("Frequency deviation",), (None,), "its name says 'deviation', so nothing was made of it"),
         (("freq error",), (None,), "its name says 'error', so nothing was made of it"),
         (("bias sd",), (None,), "its name says 'sd', so nothing was made of it"),
         (("Sampling frequency",), (None,), "its name says 'sampling', so nothing was made of it"),
         (("sample",), (None,), "its name says 'sample', so nothing was made of it"),
-        (("Frequenzabweichung [Hz]", "Frequenz [Hz]"), (None, "frequency_Hz"), "its name says 'abweich', so nothing was made of it"),
+        (("Frequenzabweichung [Hz]", "Frequenz [Hz]"), (None, "frequency_Hz"), "its name says 'deviation', so nothing was made of it"),
         (("laser temp", "chamber temp", "resonator temperature"), (None, "chamber_temperature_degC", "housing_temperature_degC"), "its name says 'laser'"),
         (("Temp ref", "T"), (None, "housing_temperature_degC"), "its name says 'ref'"),
         (("Temp ref",), ("housing_temperature_degC",), "its name says 'ref'"),
@@ -1151,3 +1219,106 @@ def test_units_and_a_printed_minus_in_cells_are_read(tmp_path):
     assert record["frequency_Hz"][3] == 4403.5
     assert record["housing_temperature_degC"][3] == -23.25
     assert not checks
+
+
+@pytest.mark.parametrize(
+    ("encoding", "names"),
+    [
+        ("utf-8", "Temps (s);Température boîtier (°C);Fréquence (Hz);Dérive (°/h)"),
+        ("cp1252", "Temps (s);Température boîtier (°C);Fréquence (Hz);Dérive (°/h)"),
+        ("cp1252", "Zeit [s];Gehäusetemperatur [°C];Frequenz [Hz];Nullpunkt [°/h]"),
+        ("utf-8", "Tiempo (s);Temperatura carcasa (°C);Frecuencia (Hz);Deriva (°/h)"),
+        ("cp1251", "Время, с;Температура корпуса, °С;Частота, Гц;Скорость дрейфа, град/ч"),
+        ("gb18030", "时间(s);壳体温度(℃);谐振频率(Hz);零偏(°/h)"),
+        ("cp932", "時間[s];筐体温度[℃];周波数[Hz];バイアス[deg/h]"),
+        ("utf-8", "Aika (s);Kotelo (°C);Taajuus (Hz);Ryömintä (°/h)"),  # by their units
+    ],
+)
+def test_headings_of_other_languages_and_code_pages(tmp_path, encoding, names):
+    (tmp_path / "raw.csv").write_bytes("\n".join([names, *(f"{10 * k};{20 + k / 8};{4432 + k / 8};{2 + k / 8}" for k in range(40)), ""]).encode(encoding))  # fmt: skip
+    record = draft_and_import(tmp_path / "raw.csv", tmp_path)
+    for name, first in (("housing_temperature_degC", 20), ("frequency_Hz", 4432), ("bias_deg_per_h", 2)):
+        assert record[name] == pytest.approx(first + np.arange(40) / 8)
+    text = (tmp_path / "map.toml").read_text()
+    assert f'encoding = "{encoding}"' in text
+    assert ("its name hardly says so" in text) == ("Aika" in names)
+    assert ("CHECK: by the words" in text) == (encoding not in ("utf-8", "cp1252"))
+
+
+def test_a_draft_that_recognises_no_column_says_what_to_do(tmp_path, capsys):
+    raw = table(tmp_path, "zeit_s,alpha,beta", (f"{k},{k % 7},{k % 5}" for k in range(30)))
+    assert hrg_import(raw, "--draft", tmp_path / "map.toml") == 0
+    assert "No column was recognised. Next: in the map, take the # off" in capsys.readouterr().out
+    assert hrg_import(raw, "--map", tmp_path / "map.toml", "--out", tmp_path / "run.csv") == 2
+    assert "take the # off the blocks" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("stamp", "remark"),
+    [
+        (lambda k: f"{10 * k}", "# door opened, by AK, twice, at once"),
+        (lambda k: f"{10 * k}", "*** alarm acknowledged ***"),
+        (lambda k: f"2026-03-03 08:{k // 6:02d}:{k % 6}0", "# door opened"),
+        (lambda k: f"2026-03-03 08:{k // 6:02d}:{k % 6}0", "*** alarm ***"),
+    ],
+)
+def test_remarks_between_rows_are_left_out_and_told(tmp_path, stamp, remark):
+    rows = [f"{stamp(k)},{20 + k / 8},{4432 + k / 8}" for k in range(40)]
+    record = draft_and_import(table(tmp_path, "time,T_case (°C),f (Hz)", [*rows[:9], remark, *rows[9:]]), tmp_path)
+    assert record["time_s"].tolist() == [10.0 * k for k in range(40)]
+    assert any("1 row without a time left out" in note and "line 11" in note for note in record.comments)
+
+
+def test_impossible_readings_are_dropped_where_the_map_says_so(tmp_path):
+    """An open thermocouple reads 850 °C; the refusal names the key."""
+    rows = [f"{k},{850 if k in (4, 5) else 20 + k / 8}" for k in range(40)]
+    raw = table(tmp_path, "time_s,T_case (°C)", rows)
+    with pytest.raises(InputError, match=r"line 6, .* = 850 is not a possible reading .* drop = \['impossible'\]"):
+        draft_and_import(raw, tmp_path)
+    record = draft_and_import(raw, tmp_path, ('unit = "degC"', 'unit = "degC"\ndrop = ["impossible"]'))
+    assert np.flatnonzero(np.isnan(record["housing_temperature_degC"])).tolist() == [4, 5]
+    assert any("2 readings of 'T_case (°C)' are impossible: left empty" in note for note in record.comments)
+
+
+def test_a_workbook_with_a_date_and_a_time_of_day_in_two_columns(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl", reason="the optional extra 'excel' is not installed")
+    book = openpyxl.Workbook()
+    book.active.append(["Date", "Time", "T_case (°C)"])
+    moments = [START + datetime.timedelta(seconds=10 * k) for k in range(40)]  # over midnight
+    for k, moment in enumerate(moments):
+        book.active.append([moment.date(), moment.time(), 20 + k / 8])
+    book.save(tmp_path / "raw.xlsx")
+    record = draft_and_import(tmp_path / "raw.xlsx", tmp_path)
+    assert (record.start, record["time_s"].tolist()) == (START, [10.0 * k for k in range(40)])
+
+
+@pytest.mark.parametrize(
+    ("name", "cell"),
+    [
+        ("Elapsed (h:mm:ss)", lambda s: f"{s // 3600}:{s // 60 % 60:02d}:{s % 60:02d}"),
+        ("Time", lambda s: f"{s // 86400}.{s // 3600 % 24:02d}:{s // 60 % 60:02d}:{s % 60:02d}"),
+        ("Elapsed (mm:ss.0)", lambda s: f"{s // 60}:{s % 60:04.1f}"),
+        ("Laufzeit", lambda s: str(datetime.timedelta(seconds=s))),
+    ],
+)
+def test_an_elapsed_time_passes_a_day(tmp_path, name, cell):
+    record = draft_and_import(table(tmp_path, f"{name};f (Hz)", (f"{cell(3600 * k)};{4432 + k / 8}" for k in range(40))), tmp_path)  # fmt: skip
+    assert record["time_s"].tolist() == [3600.0 * k for k in range(40)]
+    assert record.start is None
+
+
+def test_numbers_in_a_header_are_no_table(tmp_path):
+    """LabVIEW's .lvm states the samples, dates and steps of its channels above them, in the columns of the table."""
+    head = ["Separator\tTab", "Samples\t40\t40", "Date\t2026/03/03\t2026/03/03", "X0\t0.0E+0\t0.0E+0", "***End_of_Header***\t\t", "X_Value\tCase temperature\tFrequency"]  # fmt: skip
+    record = draft_and_import(table(tmp_path, "", [*head, *(f"{10 * k}\t{20 + k / 8}\t{4432 + k / 8}" for k in range(40))]), tmp_path)  # fmt: skip
+    assert record["time_s"].tolist() == [10.0 * k for k in range(40)]
+    assert record["frequency_Hz"][0] == 4432
+
+
+def test_a_missing_hour_tells_day_from_month(tmp_path):
+    """03/08 is the day of March on which clocks in New York skip an hour, not one of August."""
+    begin = datetime.datetime(2026, 3, 8, 5, 30, tzinfo=datetime.UTC)
+    stamps = [(begin + datetime.timedelta(minutes=k)).astimezone(ZoneInfo("America/New_York")) for k in range(200)]
+    draft = draft_map([str(table(tmp_path, "time,f (Hz)", (f"{at:%m/%d/%Y %H:%M},{4432 + k / 8}" for k, at in enumerate(stamps))))])  # fmt: skip
+    assert 'time_format = "%m/%d/%Y %H:%M"' in draft.text
+    assert '# timezone = "America/New_York"' in draft.text
