@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike
 from compensation.arrays import Array
 from compensation.constants import NINETY, zero_Celsius
 from compensation.decimation import Blocks, average_blocks
-from compensation.derivative import differentiate
+from compensation.derivative import SmoothDerivative, differentiate
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
 from compensation.noise_regression import coloured_covariance, fit_coloured
@@ -58,7 +59,7 @@ FREQUENCY = Variable("frequency", "Hz", "f", 0.0)
 TEMPERATURE = Variable("temperature", "°C", "T", -zero_Celsius)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AveragedRun:
     """One run averaged over the `blocks` of a fit, and its state over the `fine` ones that a compensation has."""
 
@@ -153,7 +154,7 @@ def prepare_run(
 ) -> BiasRun:  # fmt: skip
     """Decimate one run to blocks of a width (s), and add the rate over a window (s), `causal` (lag window/2) or not, behind `memory`."""
     run = average_run(time, state, bias, width, variable)
-    return rate_run(run, run.behind(memory.lag), window, causal=causal, memory=memory)
+    return rate_run(run, window, causal=causal, memory=memory)
 
 
 def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float, variable: Variable) -> AveragedRun:
@@ -174,13 +175,13 @@ def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float
     return AveragedRun(blocks, fine, variable)
 
 
-def rate_run(run: AveragedRun, f: Array, window: float, *, causal: bool, memory: Memory, start: float = 0.0) -> BiasRun:
+def rate_run(run: AveragedRun, window: float, *, causal: bool, memory: Memory, start: float = 0.0) -> BiasRun:
     """Return an averaged run with its state f behind the lag of a memory, play from `start`, and the rate over `window` (s)."""
     _check_seconds("window of the rate", window)
     blocks = run.blocks
-    play = follow_play(f, memory.play, start) - f
     window = max(window, 3 * blocks.width, 2.05 * float(np.median(np.diff(blocks.time))))  # three rows, in bursts too
-    derivative = differentiate(blocks.time, f, window, causal=causal)
+    f, derivative = _lagged(run, memory.lag, window, causal)
+    play = follow_play(f, memory.play, start) - f
     ok = derivative.complete
     if np.count_nonzero(ok) < 3:
         raise CompensationError(f"no stretch of the run fills the window of {window:g} s over which the rate is taken; shorten the window or record longer.")  # fmt: skip
@@ -189,6 +190,13 @@ def rate_run(run: AveragedRun, f: Array, window: float, *, causal: bool, memory:
         bias=blocks.columns["bias"][ok], width=blocks.width, window=window, lag=derivative.lag,
         missing=blocks.missing, spikes=blocks.spikes, variable=run.variable, memory=memory,
     )  # fmt: skip
+
+
+@lru_cache(maxsize=64)
+def _lagged(run: AveragedRun, lag: float, window: float, causal: bool) -> tuple[Array, SmoothDerivative]:
+    """Return the state of a run behind a lag with its rate, which a search among plays asks for again and again."""
+    f = run.behind(lag)
+    return f, differentiate(run.blocks.time, f, window, causal=causal)
 
 
 def _check_seconds(name: str, seconds: float) -> None:

@@ -81,6 +81,7 @@ class _Search:
         self.rows, self.forced = forced.shape
         self.names = names
         self.parents = parents
+        self.known: dict[tuple[str, ...], Array] = {}  # orthonormal columns of the subsets that were asked for
 
     def sum_of_squares(self, chosen: Sequence[str]) -> float:
         """Residual sum of squares of y on the forced columns and the chosen ones."""
@@ -132,6 +133,8 @@ class _Search:
         return float(np.linalg.norm(rest) / max(self.lengths[k], 1e-300))
 
     def _residual(self, chosen: Sequence[str], target: Array) -> Array:
-        index = [*range(self.forced), *(self.forced + self.names.index(name) for name in chosen)]
-        Q = scipy.linalg.qr(self.R[:, index], mode="economic")[0]
+        if (key := tuple(chosen)) not in self.known:
+            index = [*range(self.forced), *(self.forced + self.names.index(name) for name in chosen)]
+            self.known[key] = np.asarray(scipy.linalg.qr(self.R[:, index], mode="economic")[0], dtype=np.float64)
+        Q = self.known[key]
         return np.asarray(target - Q @ (Q.T @ target))

@@ -87,9 +87,8 @@ def study_bias(
 
     @lru_cache(maxsize=4096)
     def run_of(k: int, lag: float, play: float, start: float) -> BiasRun:
-        run = averaged[k]
         with naming(records[k].path or "record"):
-            return rate_run(run, run.behind(lag), window, causal=causal, memory=Memory(lag, play), start=start)
+            return rate_run(averaged[k], window, causal=causal, memory=Memory(lag, play), start=start)
 
     def prepare(memory: Memory) -> list[BiasRun]:
         starts = memory.starts or (0.0,) * len(records)

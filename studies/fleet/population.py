@@ -87,28 +87,29 @@ class Scatters:
     of: Mapping[str, Mapping[str, Measured]]  # name -> serial -> Measured
     known: dict[str, dict[str, Array]] = field(default_factory=dict, init=False, compare=False)
 
-    def scale(self, name: str) -> float:
-        """Return what the card leaves a value, 0 where that is not known."""
-        return float(np.median([one.open for one in self.of[name].values()]))
+    @cached_property
+    def scales(self) -> dict[str, float]:
+        """What the card leaves each value, 0 where that is not known."""
+        return {name: float(np.median([one.open for one in own.values()])) for name, own in self.of.items()}
 
     def prior(self, name: str, serial: str, value: Array, sd: Array) -> Array | None:
         """Return the prior of a value's scatter, by other values of other devices than one; None without one."""
-        if self.scale(name) <= 0.0:
+        if self.scales[name] <= 0.0:
             return None
         if serial not in self.known:
             self.known[serial] = {n: own for n in self.of if (own := self._evidence(n, serial)) is not None}
         likely = sum((own for n, own in self.known[serial].items() if n != name), np.zeros(CENTRES.size * WIDTHS.size))
         weights = np.exp(likely - likely.max())
-        return np.asarray(weights @ _usual(_grid(value, sd), self.scale(name)) / weights.sum())
+        return np.asarray(weights @ _usual(_grid(value, sd), self.scales[name]) / weights.sum())
 
     def _evidence(self, name: str, without: str) -> Array | None:
         """Log likelihood of every m and v by one value."""
         own = [one for serial, one in self.of[name].items() if serial != without]
-        if len(own) < FEWEST - 1 or self.scale(name) <= 0.0:
+        if len(own) < FEWEST - 1 or self.scales[name] <= 0.0:
             return None
         value, sd = np.array([one.value for one in own]), np.array([one.sd for one in own])
         flat = Population.of(value, sd, np.ones_like(GRID))
-        return np.asarray(np.log(_usual(flat.scatters, self.scale(name)) @ flat.weights + 1e-300))
+        return np.asarray(np.log(_usual(flat.scatters, self.scales[name]) @ flat.weights + 1e-300))
 
 
 @dataclass(frozen=True)

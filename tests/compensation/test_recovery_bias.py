@@ -312,12 +312,8 @@ def test_the_lag_of_steps_is_found_whatever_other_lags_leave_with_more_terms(see
         averaged.append(average_run(time, housing, bias, 100.0, TEMPERATURE))
 
     def prepare(memory):
-        starts = memory.starts or (0.0,) * len(averaged)
-        runs = zip(averaged, starts, strict=True)
-        return [
-            rate_run(run, run.behind(memory.lag), 300.0, causal=False, memory=memory, start=start)
-            for run, start in runs
-        ]
+        runs = zip(averaged, memory.starts or (0.0,) * len(averaged), strict=True)
+        return [rate_run(run, 300.0, causal=False, memory=memory, start=start) for run, start in runs]
 
     found = choose_memory(prepare)
     assert found.play == 0.0
