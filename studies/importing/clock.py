@@ -34,7 +34,8 @@ class Clock:
     """
 
     def __init__(self, file: FileMap) -> None:
-        self.file, self.form = file, file.time_format
+        self.file, self.form = file, file.time_format.partition(" + ")[0] if file.added else file.time_format
+        self.stamped = file.time[:-1] if file.added else file.time
         self.origin, self.notes = file.start, list[str]()
         self._begun: datetime.datetime | None = None  # of the file's own clock
         self._zero: float | None = None  # of a clock since an epoch
@@ -66,6 +67,8 @@ class Clock:
             seconds = self._read_durations(table)
         else:
             seconds = self._read_stamps(table)
+        if file.added:
+            seconds = seconds + table.numbers(file.time[-1]) * SECONDS[file.added]
         known = seconds[np.isfinite(seconds)]
         if known.size:
             self._range = min(self._range[0], known.min()), max(self._range[1], known.max())
@@ -133,7 +136,7 @@ class Clock:
         return seconds - (self._zero or 0.0)
 
     def _read_durations(self, table: RawTable) -> Array:
-        text = table.joined(self.file.time)
+        text = table.joined(self.stamped)
         parts = text.str.extract(rf"^{DURATIONS[self.form]}$")
         self._refuse_bad(table, text, np.asarray(parts[2].isna()))
         sizes = (86400.0, 3600.0, 60.0, 1.0)
@@ -148,7 +151,7 @@ class Clock:
         bad = np.flatnonzero(unread & np.asarray(text != ""))
         if len(bad):
             raise InputError(
-                f"{table.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{' '.join(self.file.time)}' is not a time of the"
+                f"{table.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{' '.join(self.stamped)}' is not a time of the"
                 f" form '{self.form}'; correct time_format in the map, or end the table above with last_line; a remark between rows goes into 'missing', and an elapsed time is 'h:mm:ss'."
             )
 
@@ -156,8 +159,8 @@ class Clock:
         """Parse stamps written as text; several time zones in one file are brought to UTC."""
         import pandas as pd
 
-        file, name = self.file, " ".join(self.file.time)
-        text = table.joined(file.time)
+        name = " ".join(self.stamped)
+        text = table.joined(self.stamped)
         empty = np.asarray(text == "")
         plain = text if "," in self.form else text.str.replace(",", ".", regex=False)
         form = "ISO8601" if self.form == "iso" else self.form

@@ -232,10 +232,13 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
     else:
         stated = "the lines above the table say so" if period else unsure
         lines.append(f"sample_period_s = {period or 0.0!r}    # CHECK: {stated}")
-    joined = [" ".join(stamp) for stamp in zip(*(cells[name] for name in time), strict=True)]
+    joined, whole = (
+        [" ".join(stamp) for stamp in zip(*(cells[name] for name in own), strict=True)]
+        for own in (time, time[:-1] if " + " in form else time)
+    )
     stamped = time and (form == "iso" or ("%" in form and "%z" not in form))
     if stamped or (own is not None and own.start is not None and own.start.tzinfo is None):
-        times = parse_stamps([stamp for stamp in joined if stamp.strip()], form) if stamped else []
+        times = parse_stamps([stamp for stamp in whole if stamp.strip()], form.partition(" + ")[0]) if stamped else []
         change = find_change(*since_first(times)) if times else None
         zone, doubt = (change[0], f"; CHECK: {change[1]}") if change else ("Europe/Berlin", "")
         lines.append(f'# timezone = "{zone}"    # of local times that change between summer and winter{doubt}')

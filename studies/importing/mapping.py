@@ -137,7 +137,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
     time_format: Annotated[
         str,
         says(
-            f"{', '.join(TIME_FORMATS)}, a multiple such as '0.1 s', or a pattern such as '%d.%m.%Y %H:%M:%S'",
+            f"{', '.join(TIME_FORMATS)}, a multiple such as '0.1 s', or a pattern such as '%d.%m.%Y %H:%M:%S'; + ms behind it adds a last column",
             example="s",
         ),
     ] = ""
@@ -178,6 +178,10 @@ class FileMap(Keys, frozen=True, kw_only=True):
                 f"time_format = '{self.time_format}' is unknown{nearest(self.time_format, TIME_FORMATS)} A pattern needs %,"
                 " such as '%d.%m.%Y %H:%M:%S'."
             )
+        if " %f" in self.time_format:
+            raise ValueError(
+                "time_format: %f takes 55 for 0.55; of a column of its own write '+ ms', or '+ us', at the end."
+            )
         if self.data_line <= self.header_line or (self.last_line is not None and self.last_line < self.data_line):
             lines = f"{self.header_line}, {self.data_line}, {self.last_line}"
             raise ValueError(f"header_line, data_line and last_line must follow each other ({lines}).")
@@ -188,6 +192,12 @@ class FileMap(Keys, frozen=True, kw_only=True):
     def time(self) -> tuple[str, ...]:
         """The columns that make the time."""
         return (self.time_columns,) if isinstance(self.time_columns, str) else self.time_columns
+
+    @property
+    def added(self) -> str:
+        """The unit of a last time column that holds a fraction of a second; "" where there is none."""
+        unit = self.time_format.partition(" + ")[2]
+        return unit if unit in SECONDS and len(self.time) > 1 else ""
 
     @property
     def count(self) -> tuple[float, float | None] | None:

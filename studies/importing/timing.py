@@ -60,7 +60,8 @@ def find_time(look: Look, evenly: bool = False) -> tuple[list[str], str, str]:
         for columns in [stamped, stamped[:1], stamped[1:]] if len(stamped) > 1 else [stamped]:
             form, unsure = _find_stamp(columns, cells, " ".join(hints[name].lower() for name in columns))
             if form:
-                return list(columns), form, unsure
+                more = _find_fraction(look)
+                return [*columns, *more], f"{form} + {find_spelling('time_s', more[0])}" if more else form, unsure
         return stamped[:1], "iso", "no known form fits; write the pattern"
     meant = find_meanings(hints, numbers)  # a temperature that only rises is no clock
     rising = [name for name in names if rises(numbers[name]) and name not in meant]
@@ -79,6 +80,15 @@ def find_time(look: Look, evenly: bool = False) -> tuple[list[str], str, str]:
     if unit:
         return [time], unit, unsure
     return [time], _likely_unit(values), unsure or "the name states no unit; chosen by the step between rows"
+
+
+def _find_fraction(look: Look) -> list[str]:
+    """Return a column of milliseconds or less within the second of the stamps beside it."""
+    for name, numbers in look.numbers.items():
+        size = SECONDS.get(find_spelling("time_s", plain(name)) or "", 1.0)
+        if size < 1 and numbers and 0 <= min(numbers) < max(numbers) < 1 / size:
+            return [name]
+    return []
 
 
 def find_epoch(name: str, values: Sequence[float], of: float | None) -> tuple[str, str] | None:

@@ -1322,3 +1322,13 @@ def test_a_missing_hour_tells_day_from_month(tmp_path):
     draft = draft_map([str(table(tmp_path, "time,f (Hz)", (f"{at:%m/%d/%Y %H:%M},{4432 + k / 8}" for k, at in enumerate(stamps))))])  # fmt: skip
     assert 'time_format = "%m/%d/%Y %H:%M"' in draft.text
     assert '# timezone = "America/New_York"' in draft.text
+
+
+def test_milliseconds_in_a_column_of_their_own(tmp_path):
+    """Without leading zeros 55 ms was read as 0.55 s by %f, or left unused and the rows of a second spread."""
+    at = [55 * k for k in range(40)]
+    rows = [f"2026-03-03;08:00:{ms // 1000:02d};{ms % 1000};{4432 + k / 8}" for k, ms in enumerate(at)]
+    raw = table(tmp_path, "Date;Time;ms;f (Hz)", rows)
+    assert draft_and_import(raw, tmp_path)["time_s"] == pytest.approx(np.array(at) / 1e3, abs=1e-9)
+    with pytest.raises(InputError, match=r"%f takes 55 for 0\.55; of a column of its own write '\+ ms'"):
+        draft_and_import(raw, tmp_path, (" + ms", " %f"))
