@@ -160,17 +160,15 @@ def _one_unit(one: str, two: str) -> bool:
 
 def _draft_table(path: str) -> tuple[list[str], tuple[str, ...]] | None:
     look = look_at(path)
-    if look.header is None or any(
-        is_time(name, hint) or (rises(look.numbers[name]) and read_heading("time_s", hint).unit)
-        for name, hint in look.hints.items()
-    ):
+    if look.header is None:
         return None
-    body = look.body
-    above = _lines_above(look)
+    hints, numbers, body, above = look.hints, look.numbers, look.body, _lines_above(look)
+    meanings = find_meanings(hints, numbers)
+    clocks = (name for name in hints if rises(numbers[name]) and name not in meanings)
+    if any(read_heading("time_s", hints[name]).unit for name in clocks) or any(map(is_time, hints, hints.values())):
+        return None
     if any(is_stamp(cell) for row in body[:5] for cell in row) or find_period(above) is not None:
         return None
-    hints, numbers = look.hints, look.numbers
-    meanings = find_meanings(hints, numbers)
     by_target = {meaning.target: name for name, meaning in meanings.items()}
     temperature = by_target.get("housing_temperature_degC") or by_target.get("chamber_temperature_degC")
     if temperature is None or "frequency_Hz" not in by_target or len(body) > MOST_SETTLED:

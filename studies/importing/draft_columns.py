@@ -48,10 +48,7 @@ def draft_column(
     if stated.offset:
         lines.append(f"offset = {stated.offset:.10g}{check}")
     if target.endswith("_degC") and abs(middle) >= 500 and stated.scale == 1.0:
-        lines += [
-            "scale = 1.0     # CHECK: the values look like raw counts; reading × scale + offset is the temperature",
-            "offset = 0.0    # CHECK",
-        ]
+        lines.append("scale = 1.0    # CHECK: raw counts? The temperature is reading × scale + offset")
     for key in units[unit].settings:
         nominal = next((f for one in re.findall(BRACKETED, hint) if (f := split_nominal(one)[1])), nominal)
         stated_here = key == "nominal_Hz" and nominal is not None

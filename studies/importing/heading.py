@@ -67,13 +67,8 @@ class Stated:
         """Return what a reading is in the unit of the record; None where nobody can say."""
         way = units_of(target)[self.unit or next(iter(units_of(target)))]
         x = self.scale * reading + self.offset
-        return (
-            None if way.settings or self.times != 1 or (way.never_zero and x == 0) else float(way.convert(np.array(x)))
-        )
-
-    def settled(self, scale: float) -> "Stated":
-        """Return it with a factor that may multiply or divide chosen."""
-        return Stated(self.unit, self.scale * scale, self.offset, 1.0, self.said, self.strange)
+        known = not way.settings and self.times == 1 and not (way.never_zero and x == 0)
+        return float(way.convert(np.array(x))) if known else None
 
 
 @functools.lru_cache(maxsize=4096)
@@ -90,7 +85,7 @@ def read_heading(target: str, hint: str) -> Stated:
     for content in reversed(brackets):
         last = [content.rpartition(" ")[2]] if not re.search(r"\d", content) else []
         pieces = [content, *(p for p in [*re.split(r";|,(?!\d)", content), *last] if p != content)]
-        found = [one for p in pieces if (one := _spell(target, p.strip())) and (one[0] or p is content)]
+        found = [one for p in pieces if (one := spell(target, p.strip())) and (one[0] or p is content)]
         if found and unit is None and factor == 1.0:
             unit, factor = found[0]
         else:
@@ -99,7 +94,7 @@ def read_heading(target: str, hint: str) -> Stated:
     words = bare.split()
     if unit is None and (factor != 1.0 or not brackets or said):
         texts = [*(" ".join(words[k:]) for k in range(len(words))), bare.rpartition("/")[2].strip(), *rest]
-        found = [one for one in (_spell(target, text) for text in texts) if one and one[0]]
+        found = [one for one in (spell(target, text) for text in texts) if one and one[0]]
         unit, more = found[0] if found else (None, 1.0)
         factor *= more
     strange = bool(brackets) and unit is None and factor == 1.0 and not said
@@ -110,7 +105,7 @@ def read_heading(target: str, hint: str) -> Stated:
     return Stated(unit, scale * factor, offset, times, " and ".join(said), strange and unit != "period-counts")
 
 
-def _spell(target: str, text: str) -> tuple[str | None, float] | None:
+def spell(target: str, text: str) -> tuple[str | None, float] | None:
     """Return the unit that a text spells and the factor of its numbers; None where it spells none."""
     if unit := find_spelling(target, text):
         return unit, 1.0
@@ -131,22 +126,22 @@ def _number(text: str) -> float:
 def _take(target: str, texts: Sequence[str], unit: str | None) -> tuple[list[str], float, float, float, list[str]]:
     """Return what is left of texts without what they do to the quantity, and scale, offset, the factor that may go either way, and the words that say so."""
     scale, offset, times, said, left = 1.0, 0.0, 1.0, list[str](), list[str]()
+
+    def cut(text: str, found: re.Match[str], word: str = "") -> str:
+        said.append(word or found[0].strip())
+        return f"{text[: found.start('sign') if word else found.start()]} {text[found.end() :]}"
+
     for text in texts:
-        if found := OFFSET.search(text):
-            taken = _offset(target, found, unit)
-            if taken is not None:
-                offset, text = taken, text[: found.start("sign")] + text[found.end() :]
-                said.append(found["sign"] + found["number"])
-        for pattern, power in ((NEGATED, 0.0), (DIVIDED, 1.0)):
-            if found := pattern.search(text):
-                scale *= _number(found[1]) if power else -1.0
-                said.append(found[0].strip())
-                text = text[: found.start()] + " " + text[found.end() :]
-        found = TIMES.search(text)
-        if found and (_number(found[1] or found[2]) >= CHANNELS or target.endswith("_Hz")):
-            times = _number(found[1] or found[2])
-            said.append(found[0].strip())
-            text = text[: found.start()] + " " + text[found.end() :]
+        if (found := OFFSET.search(text)) and (taken := _offset(target, found, unit)) is not None:
+            offset, text = taken, cut(text, found, found["sign"] + found["number"])
+        if found := NEGATED.search(text):
+            scale, text = -scale, cut(text, found)
+        if found := DIVIDED.search(text):
+            scale, text = scale * _number(found[1]), cut(text, found)
+        if found := TIMES.search(text):
+            n = _number(found[1] or found[2])
+            if n >= CHANNELS or target.endswith("_Hz"):
+                times, text = n, cut(text, found)
         if target.endswith("_Hz"):
             many = re.search(r"(?<![=\w.])(\d)[*·×]?f(?:\b|req)", text)
             words = [(one[0], n) for pattern, n in HARMONICS if (one := re.search(pattern, plain(text)))]

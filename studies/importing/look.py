@@ -11,10 +11,12 @@ from typing import cast
 
 from studies.errors import InputError
 from studies.importing.channels import Group, is_container, open_channels, sort_groups
+from studies.importing.heading import spell
 from studies.importing.meaning import looks_likely
-from studies.importing.notation import Notation, find_notation, is_number, is_unit, unit_of
+from studies.importing.notation import Notation, find_notation, is_number, unit_of
 from studies.importing.raw import decode, name_columns, read_filled, split_line
 from studies.importing.sheets import EXCEL, read_sheets
+from studies.importing.units import is_unit, units_of
 from studies.importing.words import ENGLISH
 
 SEEN = 2000  # lines that are looked at
@@ -207,33 +209,26 @@ def is_stamp(cell: str) -> bool:
     return STAMP.match(cell.strip()) is not None
 
 
-HZ = {"": 1.0, "k": 1e3, "m": 1e6}
-SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0}
-NUMBER = r"(\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)"
-NOMINAL = re.compile(rf"(?:nominal|nenn|\bf_?0\b|reference|centre|center)[^\d\n]{{0,30}}{NUMBER}\s*(k|m|)hz\b")
-PERIOD = re.compile(
-    rf"(?:sampl\w*|abtast\w*|log\w*|interval\w*|period\w*|\bdt\b)[^\d\n]{{0,30}}{NUMBER}\s*(s|ms|min)(?:ec\w*)?\b(?!\s*\^?-1)"
-)
-RATE = re.compile(rf"(?:sampl\w*|abtast\w*|log\w*|rate)[^\d\n]{{0,30}}{NUMBER}\s*(k|)hz\b")
+STATED = r"[^\d\n]{0,30}(\d[\d.,]*(?:e[+-]?\d+)?\s*[a-zµ]+)\b(?!\s*\^?-1)"
+NOMINAL = re.compile(rf"(?:nominal|nenn|\bf_?0\b|reference|cent(?:re|er)){STATED}", re.IGNORECASE)
+PERIOD = re.compile(rf"(?:sampl\w*|abtast\w*|log\w*|interval\w*|period\w*|\bdt\b){STATED}", re.IGNORECASE)
+RATE = re.compile(rf"(?:sampl\w*|abtast\w*|log\w*|rate){STATED}", re.IGNORECASE)
 
 
 def find_nominal(lines: Sequence[str]) -> float | None:
     """Return the nominal frequency (Hz) that a line states, such as "f nominal = 4546 Hz"; None where none does."""
-    found = _first(NOMINAL, lines)
-    return found and found[0] * HZ[found[1]]
+    return _first(NOMINAL, "frequency_Hz", lines)
 
 
 def find_period(lines: Sequence[str]) -> float | None:
     """Return the seconds between rows that a line states, such as "sample period 10 s" or "sampling rate: 50 Hz"."""
-    if found := _first(PERIOD, lines):
-        return found[0] * SECONDS[found[1]]
-    if (found := _first(RATE, lines)) and found[0] > 0:
-        return 1 / (found[0] * HZ[found[1]])
-    return None
+    rate = _first(RATE, "frequency_Hz", lines)
+    return _first(PERIOD, "time_s", lines) or (1 / rate if rate else None)
 
 
-def _first(pattern: re.Pattern[str], lines: Sequence[str]) -> tuple[float, str] | None:
-    for line in lines:
-        if found := pattern.search(line.lower()):
-            return float(found[1].replace(",", ".")), found[2]
+def _first(pattern: re.Pattern[str], target: str, lines: Sequence[str]) -> float | None:
+    for found in (found for line in lines for found in pattern.finditer(line)):
+        unit, factor = spell(target, found[1]) or (None, 1.0)
+        if unit is not None:
+            return float(units_of(target)[unit].convert(factor))
     return None

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -149,11 +149,9 @@ def is_likely(target: str, stated: Stated, numbers: Sequence[float]) -> bool | N
 def read_reading(target: str, hint: str, numbers: Sequence[float]) -> Stated:
     """Return what a heading states, where the numbers decide whether a factor multiplies or divides; scale 0 where they do not."""
     stated = read_heading(target, hint)
-    ways = [stated.settled(scale) for scale in (stated.times, 1 / stated.times)]
+    ways = [replace(stated, times=1.0, scale=stated.scale * by) for by in (stated.times, 1 / stated.times)]
     likely = [way for way in ways if is_likely(target, way, numbers)]
-    if stated.times == 1.0:
-        return stated
-    return likely[0] if len(likely) == 1 else stated.settled(0.0)
+    return stated if stated.times == 1.0 else likely[0] if len(likely) == 1 else replace(ways[0], scale=0.0)
 
 
 def looks_likely(hint: str, numbers: Sequence[float]) -> bool | None:

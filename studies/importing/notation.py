@@ -6,13 +6,11 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from studies.importing.units import find_spelling
+from studies.importing.units import is_unit
 from studies.importing.words import PRINTED
 
 EXPONENT = r"(?:[eE][+-]?\d{1,2})?"
 SHAPE = re.compile(rf"([+-]?(?:\d+(?:[.,' ]\d+)*[.,]?|[.,]\d+){EXPONENT})(?:\s*((?:[^\W\d]|[°º℃℉])\D{{0,11}}))?")
-# as columns end
-QUANTITIES = ("_degC", "_Hz", "_deg_per_h", "_deg_per_s", "_V", "_deg", "_dBm", "_dB", "_W", "_counts", "time_s")
 SMOOTHER = 0.9  # of the way that readings go up and down, over their range
 
 
@@ -64,12 +62,6 @@ def is_number(cell: str) -> bool:
 
 def _match(cell: str) -> re.Match[str] | None:
     return SHAPE.fullmatch(cell.strip().translate(PRINTED))
-
-
-@functools.lru_cache
-def is_unit(text: str) -> bool:
-    """Tell whether a text is a unit of a record's columns or of times."""
-    return any(find_spelling(one, text) for one in QUANTITIES)
 
 
 def find_notation(

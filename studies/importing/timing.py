@@ -76,7 +76,7 @@ def find_time(look: Look, evenly: bool = False) -> tuple[list[str], str, str]:
         return [time], epoch[0], unsure or epoch[1]
     if stated.scale != 1.0 or stated.times != 1.0:
         unit, said = unit or "s", f"the name says '{stated.said}'"
-        return [time], unit if stated.scale == 1.0 else f"{stated.scale:g} {unit}", said
+        return [time], unit if stated.scale == 1.0 else f"{stated.scale!r} {unit}", said
     if unit:
         return [time], unit, unsure
     return [time], _likely_unit(values), unsure or "the name states no unit; chosen by the step between rows"

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from math import pi
 
 from compensation.arrays import Array
@@ -20,82 +21,57 @@ class Unit:
     never_zero: bool = False
 
 
-def _times(factor: float, words: str) -> Unit:
-    return Unit(lambda x: x * factor, words)
+def _scaled(factors: Mapping[str, float], never_zero: bool = False) -> dict[str, Unit]:
+    """Return units of which each is a factor times that of the record."""
+    words = {name: "x" if factor == 1 else f"{factor:.10g} x" for name, factor in factors.items()}
+    return {name: Unit(lambda x, by=by: by * x, words[name], never_zero=never_zero) for name, by in factors.items()}
 
 
-def _over(numerator: float, words: str) -> Unit:
-    return Unit(lambda x: numerator / x, words, never_zero=True)
+def _over(numerator: float) -> Unit:
+    return Unit(lambda x: numerator / x, f"{numerator:g} / x", never_zero=True)
 
 
-_SAME = Unit(lambda x: x, "x")
-_TEMPERATURE = {
-    "degC": _SAME,
-    "K": Unit(lambda x: x - zero_Celsius, "x - 273.15"),
-    "mdegC": _times(1e-3, "x / 1000"),
-    "mK": Unit(lambda x: 1e-3 * x - zero_Celsius, "x / 1000 - 273.15"),
-    "degF": Unit(lambda x: (x - 32) / 1.8, "(x - 32) / 1.8"),
+_PER_H = {
+    **{"deg/h": 1.0, "deg/s": 3600.0, "mdeg/h": 1e-3, "mdeg/s": 3.6, "arcsec/s": 1.0},
+    **{"rad/s": 3600 * 180 / pi, "mrad/s": 3.6 * 180 / pi, "urad/s": 3.6e-3 * 180 / pi},
 }
-_FREQUENCY = {
-    "Hz": Unit(lambda x: x, "x", never_zero=True),
-    "mHz": Unit(lambda x: 1e-3 * x, "x / 1000", never_zero=True),
-    "kHz": Unit(lambda x: 1e3 * x, "1000 x", never_zero=True),
-    "MHz": Unit(lambda x: 1e6 * x, "1e6 x", never_zero=True),
-    "rad/s": Unit(lambda x: x / (2 * pi), "x / 2 pi", never_zero=True),
-    "period-s": _over(1.0, "1 / x"),
-    "period-ms": _over(1e3, "1000 / x"),
-    "period-us": _over(1e6, "1e6 / x"),
-    "period-counts": Unit(
-        lambda x, clock, periods: periods * clock / x, "periods clock_Hz / x", ("clock_Hz", "periods"), never_zero=True
-    ),
-    "gate-counts": Unit(lambda x, gate: x / gate, "x / gate_s", ("gate_s",), never_zero=True),
-    "ppm": Unit(lambda x, nominal: nominal * (1 + 1e-6 * x), "nominal_Hz (1 + x / 1e6)", ("nominal_Hz",)),
-    "ppb": Unit(lambda x, nominal: nominal * (1 + 1e-9 * x), "nominal_Hz (1 + x / 1e9)", ("nominal_Hz",)),
-}
-_RATE_PER_H = {
-    "deg/h": _SAME,
-    "deg/s": _times(3600.0, "3600 x"),
-    "mdeg/h": _times(1e-3, "x / 1000"),
-    "mdeg/s": _times(3.6, "3.6 x"),
-    "rad/s": _times(3600 * 180 / pi, "3600 (180 / pi) x"),
-    "mrad/s": _times(3.6 * 180 / pi, "3.6 (180 / pi) x"),
-    "urad/s": _times(3.6e-3 * 180 / pi, "0.0036 (180 / pi) x"),
-    "arcsec/s": _SAME,
-}
-_RATE_PER_S = {
-    "deg/s": _SAME,
-    "mdeg/s": _times(1e-3, "x / 1000"),
-    "deg/h": _times(1 / 3600, "x / 3600"),
-    "rad/s": _times(180 / pi, "(180 / pi) x"),
-    "mrad/s": _times(0.18 / pi, "(0.18 / pi) x"),
-    "urad/s": _times(0.18e-3 / pi, "(0.00018 / pi) x"),
-    "rpm": _times(6.0, "6 x"),
-}
-_VOLTAGE = {"V": _SAME, "mV": _times(1e-3, "x / 1000"), "uV": _times(1e-6, "x / 1e6"), "kV": _times(1e3, "1000 x")}
-_ANGLE = {"deg": _SAME, "rad": _times(180 / pi, "(180 / pi) x"), "turns": _times(360.0, "360 x")}
-
+_PER_S = ("deg/s", "mdeg/s", "deg/h", "rad/s", "mrad/s", "urad/s")
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "days": 86400.0}
 
 _BY_ENDING: Mapping[str, Mapping[str, Unit]] = {
-    "_degC": _TEMPERATURE,
-    "_Hz": _FREQUENCY,
-    "_deg_per_h": _RATE_PER_H,
-    "_deg_per_s": _RATE_PER_S,
-    "_V": _VOLTAGE,
-    "_deg": _ANGLE,
-    "_counts": {"counts": _SAME},
-    "_dBm": {"dBm": _SAME},
-    "_dB": {"dB": _SAME},
-    "_W": {"W": _SAME, "mW": _times(1e-3, "x / 1000"), "uW": _times(1e-6, "x / 1e6")},
-    "time_s": {name: _times(size, "") for name, size in SECONDS.items()},
-    "inverse_q": {
-        "1/Q": _SAME,
-        "Q": _over(1.0, "1 / x"),
-        "ppm": _times(1e-6, "x / 1e6"),
-        "ppb": _times(1e-9, "x / 1e9"),
+    "_degC": {
+        "degC": Unit(lambda x: x, "x"),
+        "K": Unit(lambda x: x - zero_Celsius, "x - 273.15"),
+        "mdegC": Unit(lambda x: 1e-3 * x, "x / 1000"),
+        "mK": Unit(lambda x: 1e-3 * x - zero_Celsius, "x / 1000 - 273.15"),
+        "degF": Unit(lambda x: (x - 32) / 1.8, "(x - 32) / 1.8"),
     },
+    "_Hz": {
+        **_scaled({"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "MHz": 1e6, "rad/s": 1 / (2 * pi)}, never_zero=True),
+        **{"period-s": _over(1.0), "period-ms": _over(1e3), "period-us": _over(1e6)},
+        "period-counts": Unit(
+            lambda x, clock, periods: periods * clock / x, "periods clock_Hz / x", ("clock_Hz", "periods"), True
+        ),
+        "gate-counts": Unit(lambda x, gate: x / gate, "x / gate_s", ("gate_s",), True),
+        "ppm": Unit(lambda x, nominal: nominal * (1 + 1e-6 * x), "nominal_Hz (1 + x / 1e6)", ("nominal_Hz",)),
+        "ppb": Unit(lambda x, nominal: nominal * (1 + 1e-9 * x), "nominal_Hz (1 + x / 1e9)", ("nominal_Hz",)),
+    },
+    "_deg_per_h": _scaled(_PER_H),
+    "_deg_per_s": _scaled({**{name: _PER_H[name] / 3600 for name in _PER_S}, "rpm": 6.0}),
+    "_V": _scaled({"V": 1.0, "mV": 1e-3, "uV": 1e-6, "kV": 1e3}),
+    "_deg": _scaled({"deg": 1.0, "rad": 180 / pi, "turns": 360.0}),
+    **{f"_{name}": _scaled({name: 1.0}) for name in ("counts", "dBm", "dB")},
+    "_W": _scaled({"W": 1.0, "mW": 1e-3, "uW": 1e-6}),
+    "time_s": _scaled(SECONDS),
+    "inverse_q": {**_scaled({"1/Q": 1.0, "ppm": 1e-6, "ppb": 1e-9}), "Q": _over(1.0)},
 }
 UNITS = "; ".join(", ".join(units) for ending, units in _BY_ENDING.items() if ending != "time_s")
+
+
+@lru_cache
+def is_unit(text: str) -> bool:
+    """Tell whether a text is a unit of a record's columns or of times."""
+    return any(find_spelling(ending, text) for ending in _BY_ENDING)
 
 
 def units_of(column: str) -> Mapping[str, Unit]:

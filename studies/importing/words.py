@@ -30,19 +30,14 @@ ENGLISH: tuple[tuple[str, str], ...] = (
     ("pattern angle", r"(wave|precession) angle|\bwinkel|\bazimut\b|\bángulo|\bугол\b|角度|方位角"),
     ("inverted", r"invertiert\w*|invers[ée]e?\b|invertid[oa]|umgekehrt|инверт\w*|反向"),
 )  # fmt: skip
+APART = r"[_.]|(?<=[a-z])(?=[A-Z][a-z])|(?<=\bT)(?=case|hous|chamb|body|box|oven|air|amb|set)"
 
 
 @functools.lru_cache
 def plain(hint: str) -> str:
     """Return a name in small English letters without what stands in brackets, its words apart."""
     name = re.sub(BRACKETED, " ", hint.translate(PRINTED))
-    name = re.sub(
-        r"(?<=[a-z])(?=[A-Z][a-z])|\bT(?=(case|hous|chamb|body|box|oven|air|amb|set)[a-z]*)|[_.]", _part, name
-    ).lower()
+    name = re.sub(APART, " ", name).lower()
     for word, others in ENGLISH:
         name = re.sub(others, f" {word} ", name)
     return " ".join(name.split())
-
-
-def _part(found: re.Match[str]) -> str:
-    return f"{found[0].strip('_.')} "

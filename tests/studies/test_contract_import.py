@@ -742,7 +742,7 @@ def test_a_heading_states_factor_offset_and_sign(tmp_path, name, column, value):
 @pytest.mark.parametrize(
     ("name", "form"),
     [("t[min]", "min"), ("t / min", "min"), ("t_min", "min"), ("time_min", "min"), ("t (h)", "h"), ("time_hours", "h"), ("T_h", ""),
-     ("Time (0.1 s)", "0.1 s"), ("Time [10 ms]", "10 ms"), ("t [1/50 s]", "0.02 s"), ("Время, мин", "min"), ("Zeit (0,1 s)", "0.1 s")],
+     ("Time (0.1 s)", "0.1 s"), ("Time [10 ms]", "10.0 ms"), ("t [1/32768 s]", "3.0517578125e-05 s"), ("Время, мин", "min"), ("Zeit (0,1 s)", "0.1 s")],
 )  # fmt: skip
 def test_a_time_in_minutes_or_hours_is_seen_by_its_name(tmp_path, name, form):
     """Else a run becomes a table of settled readings, or its minutes seconds; `T_h` is a housing."""
