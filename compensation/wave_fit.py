@@ -30,6 +30,7 @@ from compensation.electronics import Channels, ratio_of, uneven_of
 from compensation.errors import CompensationError
 from compensation.noise_regression import fit_coloured
 from compensation.ringdown.answer import Estimate
+from compensation.row_course import LONGEST, RowCourse
 from compensation.samples import read_columns, require_regular, robust_spread
 from compensation.spikes import find_spikes
 from compensation.split_columns import Conflict, Told, join_columns, polar
@@ -39,6 +40,7 @@ LEAKS = ("leak", "leak cos", "leak sin")
 LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below it, turning both ways is missing
 SENSE = 0.1  # by which a turn may differ from what the applied rate makes, to be known as that
 DOUBLED = 5.0  # times as large a wave of x/2 as of x is no wave of x; of a drift it is up to 4
+MOST_UNKNOWN = 400  # rows whose course is not known
 FEW, ODD = 30, 6.0  # rows whose turns may be unknowns, and robust standard deviations that make one so
 LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out
 MISALIGNED = 5e-4  # rad, usual standard deviation of the drives' misalignment to the pick-offs
@@ -61,6 +63,7 @@ class WaveFit:
     conflicts: tuple[Conflict, ...]
     spikes: dict[str, NDArray[np.intp]]  # rows of each column that their neighbours contradict
     wrapped: float  # rad, where the angle was wrapped, which is undone; 0 where it was not
+    uneven: NDArray[np.intp]  # rows within which it is not known how the wave turned, which are left out
     doubled: tuple[str, ...]  # columns that go as n θ rather than 2 n θ of the angle
 
 
@@ -83,9 +86,12 @@ def fit_whole_angle(
     t, *read = read_columns(time=time, **columns)
     step = require_regular(t, "the fit of a whole-angle run")
     read[0], wrapped = unwrap(read[0], harmonic)
-    # The angle turns by much of its span from row to row.
+    pushed = np.broadcast_to(np.asarray(applied, dtype=float), t.shape)
+    carried = coupling / harmonic * step * np.concatenate([[0.0], np.cumsum(pushed[:-1])])
+    read[0], read[1] = read[0] - carried, read[1] - pushed  # a rate that is applied may change from row to row
     bad = {name: find_spikes(y, LEAST_SPIKE * (name != "angle")) for name, y in zip(columns, read, strict=True)}
     y = {name: np.interp(t, t[~bad[name]], one[~bad[name]]) for name, one in zip(columns, read, strict=True)}
+    y["angle"], y["rate"] = y["angle"] + carried, y["rate"] + pushed
     theta, indicated = _begin_rows(y["angle"], late), y["rate"]
     x = 2 * harmonic * theta
     if np.ptp(x) <= LEAST_TURN:
@@ -95,31 +101,36 @@ def fit_whole_angle(
     z = float(scipy.special.ndtri(0.5 + confidence / 2))
     undetermined: list[str] = []
     # Of the rows' means, all but the last: where the wave is at both ends of the row.
-    seen = _Turn(x)
+    seen = RowCourse.of(x)
+    unknown = _find_unknown(seen, harmonic)
     command = harmonic * turn_rate / step - coupling * indicated[:-1]
-    known = np.broadcast_to(np.asarray(applied, dtype=float), t.shape)[:-1]
+    known = pushed[:-1]
     _check_sense(harmonic * turn_rate / step, coupling * known)
-    turns = [values for values in (command, known) if np.ptp(values) > LEAST_CONTRAST * np.max(np.abs(values))]
+    turns = [values for values in (command, known) if _varies(values)]
     leaks = [command, command * seen.cosine, command * seen.sine] if both_ways and turns and turns[0] is command else []
-    # In one direction what a commanded turn leaks through uneven gains is not told from the splits.
-    leak = 0.0 if both_ways else float(np.mean(command))
+    # What a steady command leaks through uneven gains is not told from the splits: by the gains, which turning one way does not tell.
+    leak = 0.0 if leaks else float(np.median(command))
     phi = coupling * np.concatenate([[0.0], np.cumsum(indicated[:-1] - known)]) * step
     card = np.array([uneven_of(pickoff_gain_ratio), pickoff_skew])
     gains, spread = np.zeros(2) if both_ways else card, UNEVEN
     drives, lost = np.array([uneven_of(drive_gain_ratio), drive_skew]), np.flatnonzero(bad["rate"][:-1])[:FEW]
+    lost = np.union1d(lost, unknown)
     for _ in range(4):
         behind = straighten(x / 2, *gains)
         mean, turned, missed, spread, odd = _turned(
-            t, x, _Turn(x + 2 * behind), phi + behind, command, gains - drives, turns, both_ways, lost
+            t, x, RowCourse.of(x + 2 * behind), phi + behind, command, gains - drives, turns, both_ways, lost
         )
-        gains, lost = gains + missed, np.union1d(lost, odd)[:FEW]
-    bad["rate"][lost] = True
+        gains, lost = gains + missed, np.union1d(lost, odd[:FEW])
+    bad["rate"][np.setdiff1d(lost, unknown)] = True
     estimates = {"rate": (mean[0] / coupling, mean[1] / coupling)}
     loss, conflicts = 0.0, list[Conflict]()
     if "decay" in y:
         # Where the pick-offs' gains make the amplitude rise and fall, its drive does so too; of a commanded turn it is a leak.
-        y["decay"][:-1] -= (gains[0] * seen.sine - gains[1] * seen.cosine) * (harmonic * turn_rate / step - command)
-    found = _modulated(seen, t, y, leaks, (leak * UNEVEN.max()) ** 2)
+        # The mean of sin x dx/dt over a row is that of −cos x at its ends.
+        ends = gains[0] * np.diff(-np.cos(x)) - gains[1] * np.diff(np.sin(x))
+        y["decay"][:-1] -= ends / (2 * step) - (gains[0] * seen.sine - gains[1] * seen.cosine) * command
+    doubt = spread if both_ways else UNEVEN
+    found = _modulated(seen, t, y, bad, leaks, (leak * doubt.max()) ** 2)
     tilt = harmonic * misalignment[0], harmonic * misalignment[1]
     told = {name: one for name, (one, _) in found.items()}
     if "frequency" in told and not stiff:
@@ -142,7 +153,7 @@ def fit_whole_angle(
 
     def true(one: Told) -> Told:
         """Damping as it is without the gains, which the driven wave has in it."""
-        return one[0] + loss * (gains + drives), one[1] + np.diag((loss * spread) ** 2 + 2 * (leak * UNEVEN[::-1]) ** 2)
+        return one[0] + loss * (gains + drives), one[1] + np.diag((loss * spread) ** 2 + 2 * (leak * doubt[::-1]) ** 2)
 
     if epsilon is not None and W is not None:
         turn, spread_of_turn = told["rate"]
@@ -156,7 +167,7 @@ def fit_whole_angle(
         )
     for name, one in {"frequency": W, "damping": joined and true(joined)}.items():
         own = polar(name, *one, harmonic) if one else {}
-        if leak and one and np.divide(*own[f"{name}_split"]) < 2:
+        if leak and not both_ways and one and np.divide(*own[f"{name}_split"]) < 2:
             undetermined.append(f"{name} split and axis: in one direction they are not told from what uneven gains make of a commanded turn")  # fmt: skip
         elif name not in wrong:
             estimates |= own
@@ -181,7 +192,7 @@ def fit_whole_angle(
         stated(estimates), tuple(undetermined), confidence,
         {name: stated(one) for name, one in alone.items()}, tuple(conflicts),
         {name: np.flatnonzero(rows) for name, rows in bad.items() if rows.any()},
-        wrapped, tuple(name for name, values in y.items() if name != "angle" and _is_doubled(x, values)),
+        wrapped, unknown, tuple(name for name, values in y.items() if name != "angle" and _is_doubled(x, values)),
     )  # fmt: skip
 
 
@@ -251,21 +262,32 @@ def _begin_rows(angle: Array, late: float) -> Array:
     return np.asarray((1 - late) * (angle - late * after) + late * behind)
 
 
+def _find_unknown(course: RowCourse, harmonic: int) -> NDArray[np.intp]:
+    """Return the rows whose means are of an unknown course; they may not be nearly all."""
+    unknown = np.flatnonzero(~course.known)
+    if len(course.known) - len(unknown) < FEW or len(unknown) > MOST_UNKNOWN:
+        raise CompensationError(f"in {len(unknown)} of {len(course.known)} rows the wave turns unevenly, or by more than {np.degrees(LONGEST / 2 / harmonic):.0f}°: what their means are of is not known. Record shorter rows, or hold each rate for several.")  # fmt: skip
+    return unknown
+
+
+def _varies(values: Array) -> bool:
+    """Whether a turn does, beside a few odd rows."""
+    low, high = np.percentile(values, [2.0, 98.0])
+    return bool(high - low > LEAST_CONTRAST * max(abs(low), abs(high)))
+
+
 def _smooth(values: Array) -> Array:
     width = max(len(values) // 50, 1)
     return np.convolve(values, np.full(width, 1 / width), mode="valid")
 
 
-class _Turn:
-    """Means of cos x and sin x over rows in which x (at their ends) grows evenly."""
-
-    def __init__(self, x: Array) -> None:
-        middle, share = (x[1:] + x[:-1]) / 2, np.sinc(np.diff(x) / (2 * np.pi))
-        self.cosine, self.sine = share * np.cos(middle), share * np.sin(middle)
-
-
 def _modulated(
-    x: _Turn, t: Array, columns: dict[str, Array], leaks: list[Array], leaked: float
+    x: RowCourse,
+    t: Array,
+    columns: dict[str, Array],
+    bad: dict[str, NDArray[np.bool_]],
+    leaks: list[Array],
+    leaked: float,
 ) -> dict[str, tuple[Told, tuple[float, float]]]:
     """Return W from frequency and from quadrature, C from the drive's effort, and the level of each with its deviation."""
     ones, slope = np.ones(len(t) - 1), (t[:-1] - t.mean()) / np.ptp(t)
@@ -278,7 +300,8 @@ def _modulated(
     for name in [name for name in terms if name in columns]:
         X, mean = np.stack([*terms[name], *leaks], axis=1), columns[name].mean()
         names = [*("first", "second", "mean", "drift")[: len(terms[name])], *LEAKS[: len(leaks)]]
-        coloured = fit_coloured(X, columns[name][:-1] - mean, names, [slice(0, len(X))])
+        keep = x.known & ~bad[name][:-1]
+        coloured = fit_coloured(X[keep], columns[name][:-1][keep] - mean, names, [slice(0, int(keep.sum()))])
         fit = coloured.regression
         b, covariance = fit.coefficients, fit.covariance + (leaked if name != "decay" else 0.0) * np.eye(X.shape[1])
         covariance[:2, :2] += (2 * _rounding(columns[name], coloured.residuals, np.hypot(*b[:2]) / 2)) ** 2 * np.eye(2)
@@ -297,7 +320,7 @@ def _rounding(values: Array, residuals: Array, amplitude: float) -> float:
 def _turned(
     t: Array,
     x: Array,
-    true: _Turn,
+    true: RowCourse,
     phi: Array,
     command: Array,
     own: Array,

@@ -98,7 +98,7 @@ def fit_whole_angle(
     names = COLUMNS | ({"rate": RATE} if RATE in record else {})
     wrong = bool(found.doubled) or any(not one.widened for one in found.conflicts)
     against = "its columns contradict each other" if wrong else ""
-    saved = None if instrument is None else keep_card(_with_estimates(instrument, estimates), save, against)
+    saved = None if instrument is None else _keep(instrument, estimates, save, against)
     alone = {names[name]: _in_card_units(one, found, record) for name, one in found.alone.items()}
     left_out = {names[name]: record["time_s"][rows].tolist() for name, rows in found.spikes.items()}
     said = _contradictions(found, names)
@@ -106,6 +106,7 @@ def fit_whole_angle(
         said.append(DOUBLED.format(", ".join(names[name] for name in found.doubled)))
     payload: dict[str, object] = {"data": run, "confidence": confidence, "saved": saved, "estimates": estimates}
     payload |= {"undetermined": found.undetermined, "alone": alone, "contradictions": said, "left_out_s": left_out}
+    payload["uneven_s"] = record["time_s"][found.uneven].tolist()
     rows = [_row(key, e) for key, e in estimates.items()]
     by_column = [_row(key, e) | {"column": name} for name, of in alone.items() for key, e in of.items()]
     columns = f"Quantity | value ± sd: Value | low … high ± sd: {100 * confidence:g} % interval | Unit"
@@ -122,12 +123,13 @@ def fit_whole_angle(
             Table("Estimates", rows, f"{columns} | key: Key of the card", "±: one standard deviation."),
             *(Sentence(f"Not determined: {sentence}.", "warning") for sentence in found.undetermined),
             *(Sentence(_left_out(name, times), "warning") for name, times in left_out.items()),
+            Sentence(_uneven(record, found), "warning") if found.uneven.size else None,
             moved and Sentence(moved, "warning"),
             Sentence(WRAPPED.format(degrees(found.wrapped))) if found.wrapped else None,
             Table("Each column alone", by_column, f"column | {columns}", ALONE, "everywhere" if wrong else "page"),
             Figure(
                 lambda: _draw(record, names),
-                "Each column less its mean over the azimuth: splits go around once in 90°.",
+                "Each column less its mean, the rate less the applied one, over the azimuth: splits go around once in 90°.",
             ),
         ],
         status=2 * (saved != save),
@@ -139,7 +141,8 @@ def _draw(record: Record, names: dict[str, str]) -> Drawing:
     height, x = 0.6 + 1.5 * len(shown), "azimuth, modulo 90° (°)"
     with style.figure(len(shown), height=height, x=x, y=shown, sharex=True, squeeze=False) as (made, axes):
         for axis, name in zip(axes[:, 0], shown, strict=True):
-            axis.plot(record["pattern_angle_deg"] % 90.0, record[name] - record[name].mean(), ".", markersize=2)
+            shown_values = record[name] - (record.columns.get("rate_deg_per_s", 0.0) if name == RATE else 0.0)
+            axis.plot(record["pattern_angle_deg"] % 90.0, shown_values - shown_values.mean(), ".", markersize=2)
         return made
 
 
@@ -151,6 +154,11 @@ def _left_out(name: str, times: list[float]) -> str:
     some = ", ".join(f"{time:g}" for time in times[:3]) + ", …" * (len(times) > 3)
     rows = f"{numbered(len(times), 'row')} of {name}"
     return f"{rows}, at {some} s: left out, contradicted by the rows beside."
+
+
+def _uneven(record: Record, found: WaveFit) -> str:
+    first = record["time_s"][found.uneven[0]]
+    return f"{numbered(found.uneven.size, 'row')} of {len(record)}, the first at {first:g} s: left out, because the wave turned unevenly within them, or so far that their means tell nothing. Shorter rows tell more."
 
 
 def _contradictions(found: WaveFit, names: dict[str, str]) -> list[str]:
@@ -240,6 +248,16 @@ def _with_estimates(instrument: Instrument, estimates: dict[str, dict[str, float
     if "loop" not in instrument.content:
         instrument = instrument.with_table("loop", {"mode": "whole-angle"})
     return instrument.with_values(values)
+
+
+def _keep(instrument: Instrument, estimates: dict[str, dict[str, float]], save: str | None, against: str) -> str | None:
+    """Save the card with the estimates, unless the fit or a bound of a value speaks against it; return where it is."""
+    if save is None or against:
+        return keep_card(instrument, save, against)
+    try:
+        return keep_card(_with_estimates(instrument, estimates), save)
+    except InputError as why:
+        return keep_card(instrument, save, f"an estimate can be none of a card ({why})")
 
 
 def _in_card_units(part: dict[str, Estimate], found: WaveFit, record: Record) -> dict[str, dict[str, float]]:

@@ -9,6 +9,7 @@ from compensation.actuators import Actuators
 from compensation.controllers import Loops
 from compensation.electronics import Channels, Electronics, LoopNoise
 from compensation.errors import CompensationError
+from compensation.row_course import RowCourse
 from compensation.wave import from_quality
 from compensation.wave_fit import fit_whole_angle
 from compensation.whole_angle import simulate_whole_angle
@@ -270,3 +271,27 @@ def test_a_wave_that_hardly_turned_is_refused():
     time = np.arange(0.0, 100.0)
     with pytest.raises(CompensationError, match=r"the wave precesses by only 10°; the fit needs more than 90°"):
         fit_whole_angle(time, np.radians(10) * time / 99, 0 * time, coupling=0.554)
+
+
+@pytest.mark.parametrize("kind", ["even", "swings", "steps"])
+def test_means_over_rows_follow_the_wave_within_them(kind):
+    """Exact limits: even stretches, a rate that swings slowly, and one that steps within rows, against fine sums of cos x."""
+    u = (np.arange(4000) + 0.5) / 4000
+    fine = np.arange(60)[:, None] + u
+    x = {
+        "even": lambda t: 1.3 * t,
+        "swings": lambda t: 30.0 * np.sin(t / 10.0),
+        "steps": lambda t: 2.0 * np.abs((t + 4.3) % 25.0 - 12.5) + 0.7 * t,
+    }[kind]
+    course = RowCourse.of(x(np.arange(61.0)))
+    assert np.count_nonzero(~course.known[:-1]) <= (kind == "swings")
+    at = course.known.nonzero()[0][2:-2]
+    assert course.cosine[at] == pytest.approx(np.cos(x(fine)).mean(axis=1)[at], abs=6e-3 if kind == "swings" else 1e-6)
+    assert course.sine[at] == pytest.approx(np.sin(x(fine)).mean(axis=1)[at], abs=6e-3 if kind == "swings" else 1e-6)
+
+
+def test_a_row_with_two_changes_of_rate_or_too_long_a_turn_is_not_known():
+    d = np.full(20, 1.0)
+    d[7], d[12], d[16] = 2.5, -9.0, 0.2
+    known = RowCourse.of(np.concatenate([[0.0], np.cumsum(d)])).known
+    assert set(np.flatnonzero(~known)) == {7, 12, 16}
