@@ -23,7 +23,7 @@ SEEN = 2000  # lines that are looked at
 HEAD = 1 << 24  # bytes
 FOOT = 50  # last lines
 HEADING = 20_000  # characters in which words are looked for that tell the code page
-PAGES = ("cp1252", "cp1251", "gb18030", "cp932", "cp1250")
+PAGES = ("cp1252", "cp1251", "gb18030", "cp932", "cp1250", "cp850")
 WORDS = (*(pattern for _, pattern in ENGLISH), "[°µ℃]")
 STAMP = re.compile(
     r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d+:\d{2}|\d+([. ]|d | days?, )\d{1,2}:\d{2}:|\d{4}年|\d{1,2}时|\d{1,2}h\d{1,2}(m|$)|\d{1,2}[- .]+[a-z]{3}[- .]+\d{2,4}\b|\d{8}T\d{4}"
@@ -178,7 +178,8 @@ def _find_encoding(path: str, data: bytes) -> str:
         known[encoding] = sum(
             not word.isascii() for pattern in WORDS for word in (one[0] for one in re.finditer(pattern, text))
         )
-    return max(known, key=lambda one: known[one], default="latin-1")
+    best = max(known, key=lambda one: known[one], default="latin-1")
+    return best if known.get(best) or best == "cp1252" else "latin-1"
 
 
 def _find_separator(lines: Sequence[str]) -> str:

@@ -14,13 +14,17 @@ from studies.schema.reader import read_file
 
 SCHEMA = "hrg.map/1"
 SEPARATORS = {";": ";", ",": ",", "tab": "\t", "|": "|", "space": r"\s+"}
-EPOCHS = {
-    **{"unix-s": (1.0, 0.0), "unix-ms": (1e-3, 0.0), "unix-us": (1e-6, 0.0), "unix-ns": (1e-9, 0.0)},
-    **{"gps-s": (1.0, -315964800.0), "labview-s": (1.0, 2082844800.0), "ntp-s": (1.0, 2208988800.0)},
-    **{"excel-days": (86400.0, 25569.0), "matlab-days": (86400.0, 719529.0)},
-    **{"mjd": (86400.0, 40587.0), "jd": (86400.0, 2440587.5)},
+EPOCHS: Mapping[str, tuple[float, float, str]] = {
+    **{f"unix-{name}": (SECONDS[name], 0.0, "unix|posix|epoch") for name in ("s", "ms", "us", "ns")},
+    "excel-days": (86400.0, 25569.0, "excel|serial"),
+    "gps-s": (1.0, -315964800.0, "gps(?!.*week)"),
+    "labview-s": (1.0, 2082844800.0, "labview|1904"),
+    "ntp-s": (1.0, 2208988800.0, "ntp"),
+    "matlab-days": (86400.0, 719529.0, "datenum|matlab"),
+    "mjd": (86400.0, 40587.0, r"\bmjd"),
+    "jd": (86400.0, 2440587.5, r"\bjd|julian"),
 }
-"""Counts since an epoch: seconds of one, and the count at the beginning of 1970."""
+"""Counts since an epoch: seconds of one, the count at the beginning of 1970, and how headings name them."""
 LOCAL = ("excel-days", "matlab-days")  # the others count from an epoch of UTC
 DURATIONS = {
     "h:mm:ss": r"(?:(\d+)[ .]?(?:d|days?)?,?[ .])?(\d+):(\d+):(\d+(?:[.,]\d*)?)",
@@ -115,7 +119,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
     decimal: Annotated[Literal[".", ","], says("of numbers")] = "."
     thousands: Annotated[Literal["", ".", ",", "'", " "], says("between groups of three digits")] = ""
     encoding: Annotated[
-        Literal["utf-8", "utf-16", "cp1252", "latin-1", "cp1250", "cp1251", "gb18030", "cp932"],
+        Literal["utf-8", "utf-16", "cp1252", "latin-1", "cp1250", "cp1251", "cp850", "gb18030", "cp932", "cp949"],
         says("of the file; gb18030 reads GBK, cp932 Shift-JIS"),
     ] = "utf-8"
     header_line: Annotated[int, number("with column names; 0: 'column 1', 'column 2', ...", least=0, most=LAST)] = 1
@@ -204,7 +208,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
         """What a numeric time counts: seconds of one, and the count in 1970 (None: from its own zero); None of other times."""
         number, _, unit = self.time_format.rpartition(" ")
         if unit in EPOCHS and not number:
-            return EPOCHS[unit]
+            return EPOCHS[unit][:2]
         try:
             size = float(number or 1) * SECONDS.get(unit, 0.0)
         except ValueError:

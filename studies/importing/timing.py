@@ -28,10 +28,6 @@ CLOCKS = (
 STAMPS = (*map(" ".join, itertools.product(DATES, CLOCKS)), "%Y%m%d%H%M%S", *CLOCKS)
 TIME_WORDS = re.compile(r"time|epoch|unix|elapsed|date|clock|stamp|^t$|^ts\b|\bm?jd\b|julian|\btow\b|^x value$")
 UNITLESS = "housing_temperature_degC"  # whose units no time has
-EPOCH_WORDS = (
-    *(("gps(?!.*week)", "gps"), ("labview|1904", "labview"), ("ntp", "ntp"), ("datenum|matlab", "matlab")),
-    *((r"\bmjd", "mjd"), (r"\bjd|julian", "jd"), ("excel|serial", "excel"), ("unix|posix|epoch", "unix")),
-)
 YEARS = (12784, 25567)  # days from 1970 to 2005 and to 2040, between which a count since an epoch is likely
 DAY = datetime.timedelta(days=1)
 LONGEST_RUN = 1000.0  # days of a file whose times look like days
@@ -94,20 +90,19 @@ def _find_fraction(look: Look) -> list[str]:
 def find_epoch(name: str, values: Sequence[float], of: float | None) -> tuple[str, str] | None:
     """Return the count since an epoch that a name states, or that values look like, by counts of so many seconds (None: of any), and what must be checked; None where they are none."""
     first, last = (values[0], values[-1]) if values else (0.0, 0.0)
-    fitting = [
-        form
-        for form, (size, begun) in EPOCHS.items()
+    fitting = {
+        form: re.search(words, name) is not None
+        for form, (size, begun, words) in EPOCHS.items()
         if of in (None, size)
         and YEARS[0] < (first - begun) * size / 86400.0 < YEARS[1]
         and (size < 86400.0 or (last - first < LONGEST_RUN and any(value % 1 for value in values)))
-    ]
-    word = next((start for pattern, start in EPOCH_WORDS if re.search(pattern, name)), "")
-    stated = [form for form in fitting if word and form.startswith(word)]
-    if not fitting or stated:
-        return (stated[0], "") if stated else None
-    usual = next((form for form in fitting if form.startswith(("unix", "excel"))), fitting[0])
-    others = [form for form in fitting if form != usual]
-    return usual, f"the values look like it{', or like ' + ', '.join(others) if others else ''}"
+    }
+    if not fitting:
+        return None
+    best, *others = sorted(fitting, key=lambda form: not fitting[form])
+    others = [form for form in others if form.startswith("unix") or not fitting[best]]  # GPS receivers log either
+    doubt = " or ".join([f"the {'name says' if fitting[best] else 'values look like'} it", *others])
+    return best, doubt if others or not fitting[best] else ""
 
 
 def rises(values: Sequence[float]) -> bool:

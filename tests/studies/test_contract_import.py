@@ -255,7 +255,8 @@ def test_published_epochs(tmp_path, form, count, start):
 @pytest.mark.parametrize(
     ("name", "first", "step", "form", "checked"),
     [
-        ("GPS time (s)", 1.4567e9, 10, "gps-s", False),
+        ("GPS time (s)", 1.4567e9, 10, "gps-s", True),  # or Unix seconds of 2016
+        ("GPS time (s)", 1.05e9, 10, "gps-s", False),
         ("LabVIEW time", 3.85e9, 10, "labview-s", False),
         ("Time", 3.85e9, 10, "labview-s", True),
         ("Time [s]", 1.7567e9, 10, "unix-s", True),
@@ -1227,6 +1228,7 @@ def test_units_and_a_printed_minus_in_cells_are_read(tmp_path):
         ("utf-8", "Temps (s);Température boîtier (°C);Fréquence (Hz);Dérive (°/h)"),
         ("cp1252", "Temps (s);Température boîtier (°C);Fréquence (Hz);Dérive (°/h)"),
         ("cp1252", "Zeit [s];Gehäusetemperatur [°C];Frequenz [Hz];Nullpunkt [°/h]"),
+        ("cp850", "Zeit [s];Gehäusetemperatur [°C];Frequenz [Hz];Drift Prüfling [°/h]"),
         ("utf-8", "Tiempo (s);Temperatura carcasa (°C);Frecuencia (Hz);Deriva (°/h)"),
         ("cp1251", "Время, с;Температура корпуса, °С;Частота, Гц;Скорость дрейфа, град/ч"),
         ("gb18030", "时间(s);壳体温度(℃);谐振频率(Hz);零偏(°/h)"),
