@@ -143,9 +143,11 @@ def simulate_run(
     if drive.holes:
         t = drive.profile.time
         longest, after = max((t[k + PARTS - 1] - t[k - 1], t[k - 1]) for k in drive.holes)
+        several = len(drive.holes) > 1
+        size = f"{numbered(len(drive.holes), 'hole')}, the longest" if several else "a hole"
+        bridged = "smooth curves bridge them" if several else "a smooth curve bridges it"
         warnings += (
-            f"the housing's temperature has {numbered(len(drive.holes), 'hole')}, the longest of {longest:.3g} s after {after:.6g} s:"
-            " a smooth curve bridges it; what happened there besides is not known.",
+            f"the housing's temperature has {size} of {longest:.0f} s after {after:.0f} s: {bridged}; what else happened there is not known.",
         )
     return VirtualRun(record, prediction, warnings)
 

@@ -14,6 +14,7 @@ from studies.calibration.problem import CardProblem, wide_law
 from studies.instrument.card import load_card
 from studies.record import Record
 from studies.simulation.chamber import load_profile
+from studies.simulation.drive import drive_by_record
 from studies.simulation.holes import PARTS, bridge_holes, straight
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.profile import Profile
@@ -50,6 +51,11 @@ def test_calibration_and_diagnosis_follow_what_comes_after_a_hole(card, record):
     residual, columns = state.residual["frequency_Hz"], state.slope["frequency_Hz"]
     assert np.sqrt(np.mean(residual**2)) > 0.05
     assert left_by(columns, residual, 1e-3) < 0.005
+
+
+def test_a_simulation_through_a_hole_says_where_it_is(card, record):
+    run = simulate_run(card, drive_by_record(record), noise=False)
+    assert any("has a hole of 1220 s after 2790 s: a smooth curve bridges it" in one for one in run.warnings)
 
 
 def test_a_straight_line_over_a_hole_stays_where_it_is():
