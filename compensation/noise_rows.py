@@ -186,17 +186,8 @@ class NoiseRows:
         With Σ_θ = θ ∂Σ/∂θ, V⁻¹ = Σ⁻¹ − U Uᵀ, U = Σ⁻¹ X C, C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, and v = Σ⁻¹ times what is left: tr V⁻¹Σ_θ, what is expected
         of the noise, less vᵀΣ_θ v, what is seen; and vᵀΣ_θ V⁻¹ Σ_φ v, the mean of observed and expected information (Johnson & Thompson 1995, J. Dairy Sci. 78, 449).
         """
-        whitener = self._factor(noise)
-        white, total = whitener(np.column_stack([columns, target])), whitener.log_determinant
-        X, r = white[:, :-1], white[:, -1]
-        about = np.zeros(X.shape[1]) if mean is None else mean
-        A = X.T @ X
-        root = cholesky(A + np.diag(precision + 1e-12 * (1 + A.diagonal())))
+        total, whitener, X, root, rest = self._likelihood(target, columns, precision, noise, mean)
         beside = solve_lower(root, X.T).T
-        found = solve_lower(root, solve_lower(root, X.T @ r + precision * about), transposed=True)
-        rest = r - X @ found
-        total += float(rest @ rest + (found - about) @ (precision * (found - about)))
-        total += 2 * float(np.log(np.diag(root)).sum())
         both, levels = np.column_stack([beside, rest]), level_slopes(noise)
         expected, seen = np.zeros((2, len(UNKNOWNS)))
         moved = np.zeros((len(rest), len(UNKNOWNS)))
@@ -220,6 +211,25 @@ class NoiseRows:
             expected[: len(theirs)] += theirs * np.array([diagonal @ wide, f, w, 2 * S.sum() - diagonal.sum(), *m])
         told = beside.T @ moved
         return total, expected, seen, moved.T @ moved - told.T @ told
+
+    def likelihood(self, target: Array, columns: Array, precision: Array, noise: Noise) -> float:
+        """Return −2 ln L alone, without slopes and curvature."""
+        return self._likelihood(target, columns, precision, noise, None)[0]
+
+    def _likelihood(
+        self, target: Array, columns: Array, precision: Array, noise: Noise, mean: Array | None
+    ) -> tuple[float, "Whitener", Array, Array, Array]:
+        """Return −2 ln L with the roots of Σ, L⁻¹ X, the root of Λ + XᵀΣ⁻¹X and what is left, whitened."""
+        whitener = self._factor(noise)
+        white, total = whitener(np.column_stack([columns, target])), whitener.log_determinant
+        X, r = white[:, :-1], white[:, -1]
+        about = np.zeros(X.shape[1]) if mean is None else mean
+        A = X.T @ X
+        root = cholesky(A + np.diag(precision + 1e-12 * (1 + A.diagonal())))
+        found = solve_lower(root, solve_lower(root, X.T @ r + precision * about), transposed=True)
+        rest = r - X @ found
+        total += float(rest @ rest + (found - about) @ (precision * (found - about)))
+        return total + 2 * float(np.log(np.diag(root)).sum()), whitener, X, root, rest
 
     def _correlated(self, run: int, noise: Noise) -> tuple[Array, ...]:
         """Covariance of the rows of a run by correlated noise of rms 1, and its slope by ln of its time; none without such noise."""

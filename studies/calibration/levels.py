@@ -62,7 +62,7 @@ def level_of_further_run(rows: NoiseRows, target: Array, columns: Array, noise: 
         logs = -0.5 * (np.log(levels / stated) / STATED_SPREAD) ** 2
     for k, level in enumerate(levels):
         own = replace(noise, offset=float(level))
-        logs[k] -= 0.5 * rows.deviance(target, columns, np.ones(columns.shape[1]), own)[0]
+        logs[k] -= 0.5 * rows.likelihood(target, columns, np.ones(columns.shape[1]), own)
     weights = np.exp(logs - scipy.special.logsumexp(logs))
 
     def beyond(sd: float) -> float:
