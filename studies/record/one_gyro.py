@@ -30,9 +30,15 @@ ALONE, FAR = 0.1, 5e-5  # of the same: left with a run apart; and by how much of
 APART, NEXT = 0.25, 2.0
 """Likewise by a law of any heat path, which leaves less; and times as much with any other run apart."""
 FARTHER = 3e-4  # of the frequency, from which on that law tells: jumps and ageing are less
-HOURS = (1, -1, 2, -2)  # by which clocks of two loggers differ: summer time, time zones
+SHIFTS = tuple(sign * 900.0 * 2.0**k for k in range(4) for sign in (1, -1))  # s, by which one of two clocks may be off
+FINER = tuple(2.0 ** (k / 8) for k in range(-8, 9))
+EVEN = 1.5  # times by which a shift that is none of these must be better
+KEPT = 0.6  # likewise, of the rows that a moved run still has
 BEND = 0.1  # of the changes of a frequency: a temperature in another unit would bend its law to its needs
 LAW, ONE, CUBIC = replace(ANY_PATH, bend=BEND), Law(bend=BEND), replace(ANY_PATH, cubic=True)
+SOONER = (
+    100.0  # s, by which a bias at most follows the resonator's own frequency; other parts of the gyro are further lags
+)
 
 
 def records_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -> list[Record]:
@@ -48,9 +54,7 @@ def runs_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -> t
     seen = [without_spikes(record) for record in kept]
     check_one_gyro(seen)
     check_one_unit(seen)
-    check_one_sign(seen)
-    check_one_reading(seen)
-    check_one_clock(seen)
+    check_one_law(seen)
     if (odd := run_apart(seen)) is not None:
         k, away = odd
         said.append(
@@ -110,83 +114,78 @@ def check_one_unit(records: Sequence[Record]) -> None:
                 )
 
 
-def check_one_sign(records: Sequence[Record]) -> None:
-    """Refuse a bias that follows one law of the frequency, or of the temperature, in all runs only with its sign changed in one."""
-    output = BIAS if any(BIAS in record for record in records) else RATE
-    if output == RATE and any("rate_deg_per_s" in record for record in records):
-        return
-    for drive in (FREQUENCY, *DRIVING):
-        members, runs = _courses(records, drive, output)
-        if len(runs) > 1:
-            levels = range(1, len(runs))
-            turned = _put_in(runs, [replace(run, output=-run.output) for run in runs])
-            k = _better(runs, likeliest(runs, CUBIC, levels), (likeliest(one, CUBIC, levels) for one in turned))
-            if k is not None:
-                which = [_path(records, one) for one in (members if len(runs) == 2 else members[k : k + 1])]
-                raise InputError(
-                    f"{' or '.join(which)}: {output} has the opposite sign: with it changed, one law of {drive} holds in all runs."
-                    " Change it where it is wrong, or leave the record out if it is of another gyro."
-                )
-            return
+def check_one_law(records: Sequence[Record]) -> None:
+    """Refuse a run that follows the law of the others only with a column read otherwise: in °F, of the opposite sign, exchanged, or moved in time.
+
+    The frequency follows the temperatures, the housing its chamber, and a bias the frequency, or the temperatures where there is none.
+    """
+    bias, drive = _bias_of(records), _drive_of(records)
+    own = next((name for name in (FREQUENCY, *DRIVING) if len(_courses(records, name, bias)[1]) > 1), "")
+    for pair in ((drive, FREQUENCY), (CHAMBER, HOUSING), (own, bias)):
+        _check_pair(records, *pair)
 
 
-def check_one_reading(records: Sequence[Record]) -> None:
-    """Refuse temperatures of one run that are in °F, have the opposite sign or are those of another column."""
-    drive = _drive_of(records)
-    members, runs = _courses(records, drive, FREQUENCY)
-    if len(runs) < 2:
-        return
-    as_read = likeliest(runs, LAW)
-    readings = [
-        ("is in °F", [replace(run, drive=(run.drive - 32.0) / 1.8) for run in runs]),
-        ("is of the opposite sign", [replace(run, drive=-run.drive) for run in runs]),
-    ]
-    readings += [
-        (f"is exchanged with {other}", there)
-        for other in DRIVING
-        if other != drive and len(there := _courses(records, other, FREQUENCY)[1]) == len(runs)
-    ]
-    for words, others in readings:
-        k = _better(runs, as_read, (likeliest(one, LAW) for one in _put_in(runs, others)))
-        if k is not None:
-            raise InputError(
-                f"{_path(records, members[k])}: {drive} {words}: read so, one law holds in all runs. Correct it, and other temperatures of that file if they are alike."
-            )
-
-
-def check_one_clock(records: Sequence[Record]) -> None:
-    """Refuse a run whose temperatures, or whose temperature and frequency, were logged by clocks that are hours apart."""
-    for drive, output in ((_drive_of(records), FREQUENCY), (CHAMBER, HOUSING)):
-        _check_clock(records, drive, output)
-
-
-def _check_clock(records: Sequence[Record], drive: str, output: str) -> None:
+def _check_pair(records: Sequence[Record], drive: str, output: str) -> None:
     members, runs = _courses(records, drive, output)
-    if len(runs) < 2:
+    if len(runs) < 2 or _holds_well(runs, as_read := _follow(runs, drive, output), 0.0):
         return
-    moved = [
-        (k, hours, both)
-        for hours in HOURS
-        for k, run in enumerate(runs)
-        if (both := run.earlier(3600.0 * hours)) is not None
+    readings: list[tuple[str, Sequence[Course]]] = []
+    if drive != FREQUENCY and output != HOUSING:
+        readings += [
+            (f"{drive} is in °F", [replace(run, drive=(run.drive - 32.0) / 1.8) for run in runs]),
+            (f"{drive} is of the opposite sign", [replace(run, drive=-run.drive) for run in runs]),
+        ]
+        readings += [
+            (f"{drive} is exchanged with {other}", there)
+            for other in DRIVING
+            if other != drive and len(there := _courses(records, other, output)[1]) == len(runs)
+        ]
+    if output not in (FREQUENCY, HOUSING):
+        readings.append((f"{output} has the opposite sign", [replace(run, output=-run.output) for run in runs]))
+    tried = [
+        (_follow(_with(runs, k, other), drive, output), k, words)
+        for words, others in readings
+        for k, other in enumerate(others)
     ]
-    as_read = likeliest(runs, LAW)
-    if not moved or _holds_well(runs, as_read):
+    if not _holds_well(runs, as_read):
+        tried += [one for one in _moved(runs, as_read, drive, output) if one < min(tried, default=(as_read,))]
+    k = _better(runs, as_read, [one for one, *_ in tried]) if tried else None
+    if k is None:
         return
-    tried = [likeliest(_with(runs, k, one), LAW) for k, _, (one, _) in moved]
-    best = _better(runs, as_read, tried, APART)
-    if best is None:
-        return
-    k, hours, (_, still) = moved[best]
-    kept = _with(
-        runs, k, still
-    )  # as far as it is not the rows left out, at a start that fades, that had made the misfit
-    others = [one for one, (other, *_) in zip(tried, moved, strict=True) if other != k]
-    if _better(kept, likeliest(kept, LAW), [tried[best]], APART) is not None and _alone(others, tried[best]):
-        raise InputError(
-            f"{_path(records, members[k])}: {drive} is {abs(hours)} h {'behind' if hours > 0 else 'ahead of'} {output}:"
-            " moved so, one law holds in all runs. Were they logged by two clocks? Move one of the columns in time, or leave the record out."
-        )
+    told: dict[str, list[str]] = {}
+    for one, run, words in tried:
+        if one.left < NEXT * tried[k][0].left:
+            told.setdefault(words, []).append(_path(records, members[run]))
+    which = "; or ".join(f"{' or '.join(paths)}: {words}" for words, paths in told.items())
+    raise InputError(
+        f"{which}: read so, one law of {drive} holds in all runs. Correct the column, and others of that file if they are alike,"
+        " or leave the record out if it is of another gyro."
+    )
+
+
+def _moved(runs: Sequence[Course], as_read: Followed, drive: str, output: str) -> list[tuple[Followed, int, str]]:
+    """Return the run that one law holds with if two of its columns were logged by clocks a quarter of an hour or more apart, if there is one."""
+
+    def move(k: int, by: float) -> tuple[Followed, int, float, list[Course]] | None:
+        both = runs[k].earlier(by)
+        return both and (_follow(_with(runs, k, both[0]), drive, output), k, by, _with(runs, k, both[1]))
+
+    tried = list(filter(None, (move(k, by) for by in SHIFTS for k in range(len(runs)))))
+    if not tried:
+        return []
+    _, k, by, _ = min(tried, key=lambda one: one[0])
+    closer = filter(None, (move(k, by * times) for times in FINER if abs(by * times) >= SHIFTS[0]))
+    # of the rows that both have: those left out, at a start that fades, may have made the misfit
+    kept = [(best, by, there, _follow(there, drive, output)) for best, _, by, there in closer]
+    best, by, there, as_kept = min(
+        kept, key=lambda one: (1.0 if one[1] in SHIFTS else EVEN) * one[0].left ** 2 / one[3].left
+    )
+    if _better(runs, as_read, [best], APART) is None or _better(there, as_kept, [best], KEPT) is None:
+        return []
+    words = (
+        f"{drive} is about {abs(by) / 3600:.2g} h {'behind' if by > 0 else 'ahead of'} {output}, as by another clock"
+    )
+    return [(best, k, words)]
 
 
 def run_apart(records: Sequence[Record]) -> tuple[int, float] | None:
@@ -214,13 +213,21 @@ def _alone(others: Sequence[Followed], best: Followed) -> bool:
     return all(NEXT * best.left < one.left for one in others)
 
 
+def _follow(runs: Sequence[Course], drive: str, output: str) -> Followed:
+    """Return what one law leaves: of a bias a cubic, each run with a level of its own, as they turn on; else one level and little bend."""
+    if output in (FREQUENCY, HOUSING):
+        return likeliest(runs, LAW)
+    return likeliest(runs, replace(CUBIC, longest=SOONER) if drive == FREQUENCY else CUBIC, range(1, len(runs)))
+
+
+def _bias_of(records: Sequence[Record]) -> str:
+    """Return the column of the output at rest, "" where there is none."""
+    turned = any("rate_deg_per_s" in record for record in records)
+    return BIAS if any(BIAS in record for record in records) else RATE * (not turned)
+
+
 def _drive_of(records: Sequence[Record]) -> str:
     return next((name for name in DRIVING if all(name in record for record in records)), "")
-
-
-def _put_in(runs: Sequence[Course], others: Sequence[Course]) -> list[list[Course]]:
-    """Return the runs with another in the place of each in turn."""
-    return [_with(runs, k, other) for k, other in enumerate(others)]
 
 
 def _with(runs: Sequence[Course], k: int, other: Course) -> list[Course]:
@@ -233,19 +240,23 @@ def _white(runs: Sequence[Course]) -> float:
 
 def _holds_well(runs: Sequence[Course], as_read: Followed, well: float = WELL) -> bool:
     """Whether one law leaves hardly more than white noise, or than a small part of the changes."""
-    changes = float(np.std(np.concatenate([run.output for run in runs])))
-    return as_read.left**2 < max(CLEAR * _white(runs), (well * changes) ** 2)
+    return as_read.left**2 < max(CLEAR * _white(runs), (well * _changes(runs)) ** 2)
+
+
+def _changes(runs: Sequence[Course]) -> float:
+    return float(np.std(np.concatenate([run.output for run in runs])))
 
 
 def _better(
     runs: Sequence[Course], as_read: Followed, tried: Iterable[Followed], part: float = OTHERWISE, well: float = WELL
 ) -> int | None:
-    """Return which of some models leaves so small a part of what one law leaves, if that does not hold well; white noise apart. None where none does."""
-    if _holds_well(runs, as_read, well):
+    """Return which of some models leaves so small a part of what one law leaves, smaller where that holds well; white noise apart. None where none does."""
+    if _holds_well(runs, as_read, 0.0):
         return None
     white = _white(runs)
     left = [one.left**2 - white for one in tried]
     k = int(np.argmin(left))
+    part *= min(1.0, as_read.left / max(well * _changes(runs), 1e-300)) ** 2
     return k if left[k] < part**2 * (as_read.left**2 - white) else None
 
 

@@ -261,6 +261,9 @@ def test_outputs_that_stand_still_are_told(record, name, value):
 CAMPAIGN = ("ramp 25 -15 1 then soak -15 2h", "ramp -15 40 1 then soak 40 2h", "cycle 20 -5 45 0.5 30min 1")
 
 
+BIAS = {"k1_deg_per_h_per_Hz": 1.0, "k4_deg_per_h_s_per_Hz": 300.0}
+
+
 def put(runs, k, change):
     return [change(run) if j == k else run for j, run in enumerate(runs)]
 
@@ -273,7 +276,7 @@ def campaign_of(card):
 @pytest.fixture(scope="module")
 def runs(card):
     """Three runs of one gyro with radiation between its parts, far from one lag."""
-    return campaign_of(card.with_table("bias", {"k1_deg_per_h_per_Hz": 1.0, "k4_deg_per_h_s_per_Hz": 300.0}))
+    return campaign_of(card.with_table("bias", BIAS))
 
 
 @pytest.fixture(scope="module")
@@ -462,7 +465,7 @@ def test_a_file_of_two_runs_is_to_be_split(tmp_path):
 @pytest.fixture(scope="module")
 def four(card, runs):
     """Those three and a run that begins with a step."""
-    made = simulate_run(card, load_profile("step 30 5 3h"), 1 / 60, 3).record
+    made = simulate_run(card.with_table("bias", BIAS), load_profile("step 30 5 3h"), 1 / 60, 3).record
     return [*runs, dataclasses.replace(made, path="run3.csv")]
 
 
@@ -501,19 +504,63 @@ def late(run, hours, names=TEMPERATURES):
     return dataclasses.replace(run, columns=columns | {"time_s": columns["time_s"] - columns["time_s"][0]})
 
 
-@pytest.mark.parametrize(("k", "hours", "said"), [(1, 1, "1 h behind"), (2, -1, "1 h ahead of")])
+@pytest.mark.parametrize(("k", "hours", "said"), [(1, 1, "about 1 h behind"), (2, -1, "about 1 h ahead of")])
 def test_temperatures_of_a_clock_an_hour_off_are_named(four, k, hours, said):
     """Such a run was a second lag and radiation, with a noise of 0.8 Hz."""
     with pytest.raises(
-        InputError, match=rf"run{k}\.csv: housing_temperature_degC is {said} frequency_Hz: moved so, one law holds"
+        InputError,
+        match=rf"run{k}\.csv: housing_temperature_degC is {said} frequency_Hz, as by another clock: read so, one law",
     ):
         said_of(put(four, k, lambda run: late(run, hours)))
 
 
 def test_a_chamber_of_a_clock_an_hour_off_is_named(four):
     """The card was told to be wrong in its conductance to the housing, by 17 of its deviations."""
-    with pytest.raises(InputError, match=r"run1\.csv: chamber_temperature_degC is 1 h behind housing_temperature_degC"):
+    with pytest.raises(
+        InputError, match=r"run1\.csv: chamber_temperature_degC is about 1 h behind housing_temperature_degC"
+    ):
         said_of(put(four, 1, lambda run: late(run, 1, TEMPERATURES[1:])))
+
+
+def four_of_one_gyro():
+    """Cooling and warming by turns: a bias of frequency and rate beside random walk."""
+    rng, runs, time = np.random.default_rng(100), [], np.arange(0.0, 18000.0, 10.0)
+    for k, (begin, end) in enumerate([(25.0, -20.0), (-20.0, 25.0)] * 2):
+        housing = end + (begin - end) * np.exp(-time / 1500.0)
+        T = follow_lag(housing, np.diff(time), 600.0) - 20.0
+        bias = 3.0 + 0.12 * T - 3.5e-3 * T**2 + 8e-5 * T**3 + 250.0 * np.gradient(T, time)
+        columns = {"time_s": time, "housing_temperature_degC": housing + 5e-3 * rng.standard_normal(time.size)}
+        columns["frequency_Hz"] = 4432.07 * (1 + 79e-6 * T - 1e-7 * T**2) + 6e-4 * rng.standard_normal(time.size)
+        bias += np.cumsum(6e-3 * rng.standard_normal(time.size)) + 0.3 * rng.standard_normal(time.size)
+        runs.append(Record(columns | {"bias_deg_per_h": bias}, path=f"run{k}.csv"))
+    return runs
+
+
+@pytest.mark.parametrize("k", range(4))
+@pytest.mark.parametrize(
+    ("read", "said"),
+    [
+        (
+            lambda run: spoilt(run, housing_temperature_degC=lambda T: 1.8 * T + 32.0),
+            "housing_temperature_degC is in °F",
+        ),
+        (lambda run: spoilt(run, bias_deg_per_h=lambda b: -b), "bias_deg_per_h has the opposite sign"),
+        (
+            lambda run: spoilt(run, bias_deg_per_h=lambda b: np.roll(b, 180)),
+            r"frequency_Hz is about 0\.[456]\d* h ahead of bias_deg_per_h",
+        ),
+        (
+            lambda run: spoilt(run, frequency_Hz=lambda f: np.roll(f, 90)),
+            r"housing_temperature_degC is about 0\.2[456] h ahead of frequency_Hz",
+        ),
+    ],
+    ids=["degF", "sign", "late bias", "late frequency"],
+)
+def test_recovery_of_the_run_and_the_reading_where_one_law_nearly_holds(read, said, k):
+    """In °F one law left 0.8 % of the changes, and was well; a lag and a run turned besides once fitted a turned bias better; a bias half an hour late was no word."""
+    with pytest.raises(InputError, match=f"^run{k}.csv: {said}[^;]*: read so"):
+        records_of_one_gyro(put(four_of_one_gyro(), k, read), print)
+    assert len(records_of_one_gyro(four_of_one_gyro(), print)) == 4
 
 
 @pytest.mark.parametrize("name", ["frequency_Hz", "bias_deg_per_h", TEMPERATURES[0]])
