@@ -171,7 +171,7 @@ def _moved(runs: Sequence[Course], as_read: Followed, drive: str, output: str) -
         return both and (_follow(_with(runs, k, both[0]), drive, output), k, by, _with(runs, k, both[1]))
 
     tried = list(filter(None, (move(k, by) for by in SHIFTS for k in range(len(runs)))))
-    if not tried:
+    if not tried or _better(runs, as_read, [one for one, *_ in tried]) is None:
         return []
     _, k, by, _ = min(tried, key=lambda one: one[0])
     closer = filter(None, (move(k, by * times) for times in FINER if abs(by * times) >= SHIFTS[0]))
