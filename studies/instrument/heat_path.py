@@ -4,12 +4,11 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from studies.errors import InputError, naming
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from shell.material import Material
     from shell.resonator import Resonator
     from studies.instrument.tables.thermal import Thermal
@@ -34,8 +33,10 @@ def build_heat_path(
 
     radius, length = _stem_size(thermal, resonator)
     with naming(where):
+        cells, joint = _cut_shell(resonator, radius, int(thermal.cells))
         return HeatPath(
-            cells=_cut_shell(resonator, radius, int(thermal.cells)),
+            cells=cells,
+            joint_volume=joint,
             volumetric_capacity=_volumetric_capacity(thermal, material, reference, where),
             conductivity=_material_value(thermal, material, "conductivity_W_per_m_K", reference, where),
             stem_radius=radius,
@@ -54,24 +55,19 @@ def build_heat_path(
 
 
 @lru_cache(maxsize=64)
-def _cut_shell(resonator: "Resonator", stem_radius: float, count: int) -> "MeridianCells":
+def _cut_shell(resonator: "Resonator", stem_radius: float, count: int) -> "tuple[MeridianCells, float]":
+    """Return the shell from where the stem ends, and the volume (m³) of its wall above the stem's end."""
     from thermal.meridian import cut_meridian_table, lump
 
-    s, r, h = _root_to_end(resonator, stem_radius)
-    if count == 1:
-        return lump(cut_meridian_table(s - s[0], r, h, FINE))
-    return cut_meridian_table(s - s[0], r, h, count)
-
-
-def _root_to_end(resonator: "Resonator", stem_radius: float) -> "tuple[NDArray[np.float64], ...]":
-    """Return distance from the start of the meridian's root (m, from where the stem ends), radius and thickness."""
     points = resonator.sample(ROWS)
     s, r, h = points.arc_length, points.r, points.thickness
     if resonator.support == "clamped-rim":
         s, r, h = resonator.length - s[::-1], r[::-1], h[::-1]
     root = max(stem_radius, 1e-3 * float(r.max()))
     first = int((r >= root).argmax()) if r[0] < root else 0
-    return s[first:], r[first:], h[first:]
+    cells = cut_meridian_table(s[first:] - s[first], r[first:], h[first:], FINE if count == 1 else count)
+    joint = float(np.trapezoid((2 * np.pi * r * h)[: first + 1], s[: first + 1]))
+    return (lump(cells) if count == 1 else cells), joint
 
 
 def _stem_size(thermal: "Thermal", resonator: "Resonator") -> tuple[float, float]:

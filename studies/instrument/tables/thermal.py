@@ -29,9 +29,7 @@ class Thermal(Keys, frozen=True, kw_only=True):
     second_mass_conductance_W_per_K: Annotated[float, number("base to that part", above=0.0, relative_sd=1.0, example=0.002)] | None = None  # fmt: skip
     drive_power_mW: Annotated[float, number("heat of the vibration, spread over the shell", least=0.0)] = 0.0
     radiation: Annotated[bool, says("false: linearised at the reference temperature; heat capacities are not")] = True
-    cells: Annotated[
-        float, number("of the shell's meridian; 1 makes it a lump, which the stem always is", least=1.0, most=400.0)
-    ] = 24
+    cells: Annotated[float, number("of the shell's meridian; 1 makes it a lump", least=1.0, most=400.0)] = 24
     stem_radius_mm: Annotated[Length, says("of the card's stem; without one a sixth of the radius", example=2.5)] | None = None  # fmt: skip
     stem_length_mm: Annotated[Length, says("of the card's stem; without one the radius", example=10.0)] | None = None
     conductivity_W_per_m_K: Annotated[float, number("of the material table unless given", above=0.0, relative_sd=0.3, example=1.38)] | None = None  # fmt: skip
