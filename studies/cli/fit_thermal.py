@@ -79,7 +79,8 @@ def fit_thermal(
         "notes": found.notes,
     }
     table = [
-        e | dict(zip(("constant", "unit"), NAMES[name], strict=True)) | {"shown": "not determined" if e["value"] is None else e["value"]}
+        (e if e["determined"] or name in found.negative else {}) | dict(zip(("constant", "unit"), NAMES[name], strict=True))
+        | {"shown": e["value"] if e["determined"] else "below zero" if name in found.negative else "not determined"}
         for name, e in estimates.items()
     ]  # fmt: skip
     columns = f"Constant | shown in low … high: Value | low … high: {100 * confidence:g} % interval .0 | Unit"

@@ -22,7 +22,6 @@ from studies.inference.heat_path import (
     LAGS,
     OF_LUMPS,
     SENSOR,
-    SURE_SHARE,
     WORTH,
     HeatPath,
     by_thermometer,
@@ -127,12 +126,13 @@ def fit_thermal_constants(
     def find(law: dict[str, Any]) -> HeatPath:
         return find_heat_path(fit(build_problem(card.with_table("law", law), campaign.records)), lags, {}, progress)
 
-    path = find(law | {"delay_s": {"value": 0.0, "sd": 0.0}})
-    share, error = path.value(SHARE)
-    if lags is None and (abs(share) > SURE_SHARE * error or wanders(path.fit)):
-        # Seconds by which a sensor or a clock is late look like radiation, or like slow noise.
-        late = find(law)
-        path = late if late.evidence > path.evidence + WORTH else path
+    # Seconds by which a sensor or a clock is late look like radiation, like slow noise, or like lumps that load each other.
+    path = find(law)
+    delay, error = path.value(DELAY)
+    if delay**2 < 4.0 * WORTH * error**2 or wanders(path.fit) or _has_lumps(path):
+        prompt = find(law | {"delay_s": {"value": 0.0, "sd": 0.0}})
+        worth = WORTH * (_has_lumps(path) >= _has_lumps(prompt))
+        path = path if path.evidence > prompt.evidence + worth else prompt
     estimates = dict(_estimates(path, float(scipy.stats.norm.ppf(0.5 + 0.5 * confidence))))
     groups = (
         [NAMES[name] for name in group if name in NAMES]
@@ -146,6 +146,10 @@ def fit_thermal_constants(
         tuple(_departures(path)),
         campaign.notes,
     )
+
+
+def _has_lumps(path: HeatPath) -> bool:
+    return any(f"law.{key}" in path.fit.problem.priors.names for key in OF_LUMPS)
 
 
 def curvature_of(instrument: Instrument, reference: float) -> dict[str, dict[str, float]]:

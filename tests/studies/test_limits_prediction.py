@@ -190,7 +190,8 @@ def test_departures_decay_from_their_start(drive, law):
     found = predict(bare, replace(drive, initial={"base": 2.0, "resonator": -1.0}), law=law)
     plain = predict(bare, drive, law=law)
     away = found.columns["resonator_temperature_degC"] - plain.columns["resonator_temperature_degC"]
-    assert away[0] == pytest.approx(-0.912, abs=0.01)  # the four slowest modes of the same path with its stem in 100 cells: the rest is in fast ones
+    # the four slowest modes of the same path with its stem in 100 cells have this: the rest is in fast ones
+    assert away[0] == pytest.approx(-0.912, abs=0.01)
     assert away.max() > 0.2  # the base warms it
     assert abs(away[-1]) < 0.5 * away.max()
 

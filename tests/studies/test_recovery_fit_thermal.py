@@ -171,6 +171,25 @@ def test_two_lags_in_series_are_found_and_a_second_is_not_made_up():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("lags", [None, 2])
+def test_two_lags_read_early_are_no_lumps_that_load_each_other(lags):
+    """Two runs behind lags of 1370, 350, 17 and 7 s read by a sensor of 10 s: were told as lumps of 1150 (1050 … 1260) and 412 (375 … 453) s with radiation.
+
+    The delay was tried only where lags and lumps left slow noise or radiation; twelve constants of lumps leave none.
+    """
+    runs, taus = [], (1370.0, 350.0, 17.0, 7.0)
+    for seed, words in enumerate(("step 25 -20 5h", "step -20 45 5h")):
+        t, T_h = housing(words, row=120.0)
+        T_r = sum(tau**3 / np.prod([tau - one for one in taus if one != tau]) * lag(t, T_h, tau) for tau in taus)
+        runs.append(record(t, lag(t, T_h, 10.0), T_r, seed, white=2e-4, sensor=1e-3))
+    found = fit_thermal_constants(runs, lags=lags)
+    assert found.estimates["time_constant_1"].value == pytest.approx(1370.0, rel=1e-3)
+    assert found.estimates["time_constant_2"].value == pytest.approx(350.0, rel=2e-3)
+    assert found.estimates["radiated_share"].value == pytest.approx(0.0, abs=1e-3)
+    assert not any(name in found.estimates for name in ("capacity_ratio", "base_radiated_share", "direct_share"))
+
+
+@pytest.mark.slow
 @pytest.mark.usefixtures("fine")
 @pytest.mark.parametrize(
     ("taus", "past", "late"),
