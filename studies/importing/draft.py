@@ -11,7 +11,7 @@ from studies.errors import InputError
 from studies.files.given import shorten
 from studies.importing.channels import is_container, open_channels, sort_groups
 from studies.importing.daylight import find_change
-from studies.importing.draft_columns import comment_of, draft_column, draft_unknown, find_markers, guess_meanings
+from studies.importing.draft_columns import check, comment_of, draft_column, draft_unknown, find_markers, guess_meanings
 from studies.importing.heading import read_heading
 from studies.importing.join import read_series, shift_between
 from studies.importing.look import Look, find_nominal, find_period, is_stamp, look_at, look_at_group
@@ -190,14 +190,12 @@ def _describe_notation(path: str, look: Look) -> list[str]:
         return [*lines, *([f"group = {spell_value(named.name)}"] if named.name else []), *said]
     if look.encoding:
         notation = look.notation
-        doubt = f"    # CHECK: {comment_of(notation.doubt)}" if notation.doubt else ""
-        lines += [f"separator = {spell_value(look.separator)}", f'decimal = "{notation.decimal}"{doubt}']
-        guessed = (
-            ""
-            if look.encoding in ("utf-8", "utf-16", "cp1252")
-            else "    # CHECK: by the words that it makes of the headings"
-        )
-        lines += [f'encoding = "{look.encoding}"{guessed}']
+        usual = look.encoding in ("utf-8", "utf-16", "cp1252")
+        lines += [
+            f"separator = {spell_value(look.separator)}",
+            f'decimal = "{notation.decimal}"{check(notation.doubt)}',
+            f'encoding = "{look.encoding}"{check("" if usual else "by the words that it makes of the headings")}',
+        ]
         lines += [f'thousands = "{notation.thousands}"'] if notation.thousands else []
     elif look.others:
         lines += [
@@ -224,16 +222,14 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
         lines.append(f"missing = {spell_value(markers)}    # CHECK: these cells mean 'no value'")
     if time:
         lines.append(f"time = {spell_value(time[0] if len(time) == 1 else time)}")
-        lines.append(f"time_format = {spell_value(form)}{f'    # CHECK: {unsure}' if unsure else ''}")
+        lines.append(f"time_format = {spell_value(form)}{check(unsure)}")
     elif own is not None:
         lines.append('time_format = "own"    # the clock of the file itself')
     else:
         stated = "the lines above the table say so" if period else unsure
-        lines.append(f"sample_period_s = {period or 0.0!r}    # CHECK: {stated}")
-    joined, whole = (
-        [" ".join(stamp) for stamp in zip(*(cells[name] for name in own), strict=True)]
-        for own in (time, time[:-1] if " + " in form else time)
-    )
+        lines.append(f"sample_period_s = {period or 0.0!r}{check(stated)}")
+    joined = [" ".join(stamp) for stamp in zip(*(cells[name] for name in time), strict=True)]
+    whole = [stamp.rpartition(" ")[0] if " + " in form else stamp for stamp in joined]
     stamped = time and (form == "iso" or ("%" in form and "%z" not in form))
     if stamped or (own is not None and own.start is not None and own.start.tzinfo is None):
         times = parse_stamps([stamp for stamp in whole if stamp.strip()], form.partition(" + ")[0]) if stamped else []
@@ -255,10 +251,9 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
         rows = zip(joined, zip(*cells.values(), strict=True), strict=True)
         copies = [one[1] == two[1] for one, two in itertools.pairwise(rows) if one[0] == two[0]]
         if copies:
-            kept = "first", "some rows stand there twice"
-            if not all(copies):
-                kept = "spread", "some times repeat; 'first' keeps one row"
-            lines.append('repeated_times = "{}"    # CHECK: {}'.format(*kept))
+            same = "first", "some rows stand there twice"
+            kept, why = same if all(copies) else ("spread", "some times repeat; 'first' keeps one row")
+            lines.append(f'repeated_times = "{kept}"{check(why)}')
     lines.append("# clock_offset_s = 0.0    # added to this file's times: positive when its clock is behind")
     usable = {name: hints[name] for name in names if name not in time and numbers[name]}
     group = look.group.name if look.group is not None else ""
@@ -270,7 +265,7 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
         if name in others:
             lines += ["", *draft_unknown(name, numbers[name], hints[name])]
         elif name in meanings:
-            guessed = "    # CHECK: guessed from its values" if look.header is None else ""
+            guessed = "guessed from its values" if look.header is None else ""
             nominal = find_nominal([*above, name])
             drafted = draft_column(name, meanings[name], hints[name], numbers[name], guessed, nominal)
             if look.group is not None and taken:

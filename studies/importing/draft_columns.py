@@ -33,27 +33,25 @@ def draft_column(
     """Return the entry of a column with a meaning, and what must be checked in it."""
     target, stated = meaning.target, read_reading(meaning.target, hint, numbers)
     units, unit = units_of(target), stated.unit or next(iter(units_of(target)))
-    remark = remark or ("" if stated.unit else "    # CHECK: the name states no unit")
+    remark = remark or ("" if stated.unit else "the name states no unit")
     middle = sorted(numbers)[len(numbers) // 2]
-    doubt = f"    # CHECK: {comment_of(meaning.doubt)}" if meaning.doubt else ""
-    lines = [f"from = {spell_value(name)}", f'to = "{target}"{doubt}']
+    lines = [f"from = {spell_value(name)}", f'to = "{target}"{check(meaning.doubt)}']
     if target.endswith("_degC") and stated.unit is None and 200 < stated.scale * middle < 500:
-        unit, remark = "K", "    # CHECK: the values look like kelvin"
-    lines.append(f'unit = "{unit}"{remark}')
-    check = f"    # CHECK: the name says '{comment_of(stated.said)}'"
+        unit, remark = "K", "the values look like kelvin"
+    lines.append(f'unit = "{unit}"{check(remark)}')
+    said = f"the name says '{stated.said}'"
     if stated.scale != 1.0:
         n = read_heading(target, hint).times
-        either = f"{check}: the quantity is {1 / n:g} or {n:g} times the reading"
-        lines.append(f"scale = {stated.scale!r}" + (check if stated.scale else either))
+        either = "" if stated.scale else f": the quantity is {1 / n:g} or {n:g} times the reading"
+        lines.append(f"scale = {stated.scale!r}{check(said + either)}")
+    elif target.endswith("_degC") and abs(middle) >= 500:
+        lines.append(f"scale = 1.0{check('raw counts? The temperature is reading × scale + offset')}")
     if stated.offset:
-        lines.append(f"offset = {stated.offset:.10g}{check}")
-    if target.endswith("_degC") and abs(middle) >= 500 and stated.scale == 1.0:
-        lines.append("scale = 1.0    # CHECK: raw counts? The temperature is reading × scale + offset")
+        lines.append(f"offset = {stated.offset:.10g}{check(said)}")
     for key in units[unit].settings:
         nominal = next((f for one in re.findall(BRACKETED, hint) if (f := split_nominal(one)[1])), nominal)
-        stated_here = key == "nominal_Hz" and nominal is not None
-        value, said = (nominal, "stated in the file; ") if stated_here else (0.0, "")
-        lines.append(f"{key} = {value!r}    # CHECK: {said}{_SETTING_WORDS[key]}")
+        value, said = (nominal, "stated in the file; ") if key == "nominal_Hz" and nominal is not None else (0.0, "")
+        lines.append(f"{key} = {value!r}{check(said + _SETTING_WORDS[key])}")
     if meaning.axis:
         lines.append(f'axis = "{meaning.axis}"')
     return ["[[file.column]]", *lines]
@@ -99,6 +97,11 @@ def _sentinels(cells: Sequence[str], notation: Notation) -> list[str]:
     numbers = [(cell, abs(number)) for cell in cells if (number := notation.number(cell)) is not None]
     usual = max((size for _, size in numbers if size not in SENTINELS), default=math.inf)
     return [cell for cell, size in numbers if size in SENTINELS and size > 2 * usual]
+
+
+def check(doubt: str) -> str:
+    """Return a doubt as it stands behind a line; nothing without one."""
+    return f"    # CHECK: {comment_of(doubt)}" if doubt else ""
 
 
 def comment_of(text: str) -> str:
