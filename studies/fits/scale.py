@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from compensation.rate_law import CARRIED, LEAST, RateLaw
 from compensation.samples import is_regular
 from compensation.stability import allan_deviation
 from studies.errors import InputError, naming
+from studies.fits.misread_scale import Runs, check_agreement, check_late
 from studies.fits.scale_law import BLOCKS, SWEPT, read_law, warming_of, without_warming
 from studies.models.kinds.scale import RAW
 from studies.record import Record
@@ -25,10 +26,6 @@ from studies.record.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_co
 STEPS = ("rough", "bias_compensated", "rate_compensated", "temperature_compensated", "filtered")
 STEADY = 0.01  # part of the rate by which a rate table may waver and still turn at one rate
 SHORT, LONG = 1.0, 100.0  # s, at which the random walk is read: a filter of 5 s changes the first, not the second
-
-
-Runs: TypeAlias = tuple[BellRun, BellRun | None, BellRun | None]
-"""Of several rates at one temperature; at rest, and at one rate, over temperature."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +105,9 @@ def study_scale(records: Sequence[Record], cutoff: float | None, order: int) -> 
     tables: list[BellRun] = []
     read = [_read_run(record, output, column) for record in records]
     left_out = sum(missing for _, missing in read)
+    for record, (run, _) in zip(records, read, strict=True):
+        if np.ptp(run.rate) > LARGEST_REST:
+            check_late(run, record.path, output)
     _check_applied({record.path: run for record, (run, _) in zip(records, read, strict=True)}, output)
     for record, (run, _) in zip(records, read, strict=True):
         kind = _classify(run, record.path)
@@ -151,6 +151,9 @@ def study_scale(records: Sequence[Record], cutoff: float | None, order: int) -> 
     thin = (_thin(rates), rest and _thin(rest), turning and _thin(turning))
     found = law.chosen.name if law and len(np.unique(same_rate(rates.rate))) >= LEAST else ""
     form = found if found in CARRIED else None
+    if not from_table:
+        paths = [sorted_runs[kind][1] if kind in sorted_runs else "" for kind in KINDS]
+        check_agreement(thin, paths, column, output, partial(fit_chain, rough=rough, cutoff=None, form=form))
     with naming(", ".join(path for _, path in sorted_runs.values())):
         chain = fit_chain(*thin, rough=rough, cutoff=cutoff, order=order, sampling=sampling, form=form)
         before, after = _hold_out(thin, rough, form)
