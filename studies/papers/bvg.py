@@ -11,7 +11,8 @@ from compensation.bell import BellChain, PolynomialCurve, apply_chain, design_sm
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.linearity import measure_nonlinearity
 from compensation.stability import allan_deviation
-from studies.fits.scale import Runs, StepFigures, judge_steps
+from studies.fits.misread_scale import Runs
+from studies.fits.scale import StepFigures, judge_steps
 from studies.reports import style
 from studies.results import Chapter, Column, Drawing, Figure, Table
 
