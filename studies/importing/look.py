@@ -139,7 +139,9 @@ def _find_table(rows: list[list[str]], end: Sequence[Sequence[str]], total: int)
 def _is_remark(row: Sequence[str]) -> bool:
     """Tell whether a row holds words in its first cell alone, or behind a #."""
     first, *others = [cell.strip() for cell in row] or [""]
-    return first[:1] == "#" or (first != "" and not any(others) and not _is_reading(first))
+    filled = list(filter(None, others))
+    words = not filled or (first[:1] == "#" and not all(map(_is_reading, filled)))
+    return first != "" and words and not _is_reading(first)
 
 
 def _last_line(first: Sequence[str], end: Sequence[Sequence[str]], total: int) -> int | None:

@@ -300,12 +300,11 @@ def _parse_text(path: str | Path, body: _Body, file: FileMap, names: list[str]) 
                     cells = cells.fillna("")
                     if not len(cells) or (cells.index[-1] < ROWS_AT_ONCE - 1 and not cells.to_numpy().any()):
                         raise _no_rows(path, file)
-                    if file.sample_period is None:  # a remark becomes a row without a time
-                        first = cells[names[0]].str.startswith("#")
-                        used = {*file.time, *(column.source for column in file.columns)}
-                        if names[0] not in used:
-                            first &= ~cells.iloc[:, 1:].any(axis=1)
-                        cells[first] = ""
+                    remark = cells[names[0]].str.startswith("#")
+                    if file.sample_period is None and remark.any():  # it becomes a row without a time
+                        if names[0] not in {*file.time, *(column.source for column in file.columns)}:
+                            remark &= (cells.iloc[:, 1:] == "").all(axis=1)
+                        cells[remark] = ""
                     longer = cells.index[cells[OVERFLOW].str.strip() != ""]
                     if len(longer):
                         line = file.data_line + int(longer[0])

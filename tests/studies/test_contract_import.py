@@ -1271,6 +1271,12 @@ def test_remarks_between_rows_are_left_out_and_told(tmp_path, stamp, remark):
     assert any("1 row without a time left out" in note and "line 11" in note for note in record.comments)
 
 
+def test_a_label_that_begins_with_a_hash_is_no_remark(tmp_path):
+    rows = [f"#{k},{10 * k},{4432 + k / 8}" for k in range(40)]
+    record = draft_and_import(table(tmp_path, "row,time_s,f (Hz)", [*rows[:9], "# door", *rows[9:]]), tmp_path)
+    assert record["time_s"].tolist() == [10.0 * k for k in range(40)]
+
+
 def test_impossible_readings_are_dropped_where_the_map_says_so(tmp_path):
     """An open thermocouple reads 850 °C; the refusal names the key."""
     rows = [f"{k},{850 if k in (4, 5) else 20 + k / 8}" for k in range(40)]
