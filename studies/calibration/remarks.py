@@ -81,7 +81,7 @@ def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
         if rung.calibrated > most:
             own, like = found.noise[name], ""
             if own.markov and not slow.markov:
-                like = f" It is like correlated noise of {own.markov:.2g}{_unit(name)} (rms) and {own.markov_time:.2g} s, which the card does not state."
+                like = f" It looks like correlated noise of {own.markov:.2g}{_unit(name)} rms with a correlation time of {own.markov_time:.0f} s; the card states none."
             said.append(
                 f"poor fit in the {WORDS[name]}: residual {rung.calibrated:.2g}{_unit(name)} (rms), noise {usual:.2g}.{like} The calibrated values"
                 f" absorb part of this misfit; hrg diagnose --card looks for the missing effect."

@@ -35,6 +35,8 @@ def result_of(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseRe
     terms = any(term.response == name for term in found.final.terms) or (
         found.path is not None and name == found.search.linear.responses[0]
     )
+    if not terms and (found.path is not None or any(term.effect.thermal for term in found.final.terms)):
+        plain, before = rows, after  # without a cause of its own it follows the temperature that was found
     mine = [cause for cause in causes if cause.response == name and cause.kind == "physics"]
     values = any(cause.is_wrong_value and cause.response == name for cause in causes)
     share = (left.share if left.significant else 1.0) if terms else None

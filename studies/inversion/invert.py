@@ -165,21 +165,26 @@ def _fit_likely(
 
 
 def _fit(model: ModeModel, modes: Sequence[Which], y: Array, relative: Array, J: Array) -> ModeFit:
-    u, converged = np.zeros(J.shape[1]), False
+    u, converged, exact = np.zeros(J.shape[1]), False, True
     size, unit = np.inf, np.eye(len(u))
+    g, error = model.predict(modes, u)
     for _ in range(MOST_STEPS):
-        g, error = model.predict(modes, u)
         noise = np.hypot(relative, error)
         both = np.vstack([J / noise[:, None], unit])
         step = np.linalg.lstsq(both, np.concatenate([(y - g) / noise, -u]), rcond=None)[0]
         size = float(np.linalg.norm(both @ step))
-        if size < NEAR:
+        if size < NEAR and exact:
             converged = True
             break
+        if size < NEAR:
+            J, exact = model.derivatives(modes, u), True
+            continue
+        before, last = u, g
         u = model.priors.inside(u + step * min(1.0, 3.0 / float(np.linalg.norm(step))))
-        if np.linalg.norm(step) > FAR:
-            J = model.derivatives(modes, u)
-    g, error = model.predict(modes, u)
+        g, error = model.predict(modes, u)
+        moved = u - before
+        if np.linalg.norm(moved) > FAR:  # Broyden's update: the derivatives that it stands for cost fifteen predictions
+            J, exact = J + np.outer(g - last - J @ moved, moved) / (moved @ moved), False
     noise = np.hypot(relative, error)
     precision = (J / noise[:, None]).T @ (J / noise[:, None]) + unit
     r = (y - g) / noise

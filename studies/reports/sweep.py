@@ -247,7 +247,8 @@ def _range(parameter: StudyParameter) -> str:
     if parameter.values:
         words = ", ".join(analysis.number(value) for value in parameter.values[:8])
         return words + (f", … ({len(parameter.values)})" if len(parameter.values) > 8 else "")
-    return f"{analysis.number(parameter.low)} … {analysis.number(parameter.high)}"
+    drawn_beyond = parameter.distribution == "normal" and not parameter.bounded
+    return f"{analysis.number(parameter.low)} … {analysis.number(parameter.high)}" + " (± 3 sd)" * drawn_beyond
 
 
 def _distribution(parameter: StudyParameter) -> str:

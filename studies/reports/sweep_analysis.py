@@ -143,6 +143,8 @@ def _worst_case(results: Results, found: Mapping[str, Any]) -> list[Part]:
         *(Column(_parameter(p.name), figures.label(p.name, p.unit), form=".8g") for p in results.study.parameters),
     )
     note = "Bounded quasi-Newton search from the worst corner of the box; text parameters keep their nominal value."
+    if any(p.distribution == "normal" and not p.bounded for p in results.study.parameters):
+        note += " The range of a normal parameter without bounds is ± 3 standard deviations: one design in 370 is drawn beyond it for each, and may lie beyond these values."
     return [Table(f"Worst cases of {found['column']} within the ranges", rows, columns, note)]
 
 

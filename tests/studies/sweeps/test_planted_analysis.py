@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from studies.errors import InputError
-from studies.reports.sweep_analysis import tolerance_parts
+from studies.reports.sweep_analysis import search_parts, tolerance_parts
 from studies.results import Sentence
 from studies.sweeps.run import run_study
 from studies.sweeps.search import name_search
@@ -155,6 +155,17 @@ def test_worst_case(tmp_path, functions):
     assert worst["least"]["value"] == pytest.approx(0, abs=1e-4)  # inside the box, where no corner is
     assert worst["greatest"]["value"] == pytest.approx(1.3**2 + 1.2**2, rel=1e-12)
     assert worst["greatest"]["parameters"] == {"user.x": -1.0, "user.y": 1.0, "user.z": 0.7}
+
+
+def test_worst_cases_of_normal_parameters_say_that_designs_are_drawn_beyond(tmp_path, functions):
+    """The box of a normal parameter ends at three standard deviations; its draws do not."""
+    functions.write_text("def line(i, p):\n    return p['user.x']\n")
+    normal = {"name": "user.x", "nominal": 0.0, "distribution": "normal", "standard_deviation": 2.0}
+    search = [{"kind": "worst-case", "column": "line"}]
+    results = study(tmp_path, "line", {"method": "sobol", "cases": 64, "seed": 1}, normal, search=search)
+    (table,) = search_parts(results, "worst-case")
+    assert [row["value"] for row in table.rows] == pytest.approx([-6.0, 6.0])
+    assert "± 3 standard deviations: one design in 370 is drawn beyond it" in table.note
 
 
 @pytest.mark.slow
