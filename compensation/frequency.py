@@ -23,6 +23,7 @@ from compensation.regression import FTest, LinearFit, compare_nested
 
 FARTHEST_REFERENCE = 1e4  # °C, and absolute zero
 ODD = 1e-4  # probability with which a table without a mistake has an odd reading
+MOST = 300  # rows of a table of which two are looked for that are exchanged
 GRID = 2001  # temperatures at which a curve is looked at
 
 
@@ -220,6 +221,23 @@ def odd_reading(temperature_degC: Array, frequency: Array, order: int) -> tuple[
     t = np.abs(away) * np.sqrt(kept) / np.sqrt(np.maximum(rest, 1e-300) / free)
     k = int(np.argmax(t))
     return (k, float(away[k])) if t[k] > scipy.special.stdtrit(free, 1 - ODD / 2 / len(y)) else None
+
+
+def exchanged_readings(temperature_degC: Array, frequency: Array, order: int) -> tuple[int, int] | None:
+    """Return the two rows whose frequencies one curve has the other way round, where chance does so once in ten thousand tables."""
+    count = len(frequency)
+    free = count - order - 2
+    if free < 1 or count > MOST or not np.ptp(temperature_degC):
+        return None
+    x, y = (temperature_degC - temperature_degC.mean()) / np.ptp(temperature_degC), frequency - frequency.mean()
+    Q = np.linalg.qr(np.vander(x, order + 1))[0]
+    M = np.eye(count) - Q @ Q.T
+    r, by = M @ y, y[:, None] - y  # |M (y − d (e_i − e_j))|², d = y_i − y_j
+    kept = np.diag(M)[:, None] + np.diag(M) - 2 * M
+    left = np.maximum(float(r @ r) - 2 * by * (r[:, None] - r) + by**2 * kept, 1e-24 * float(y @ y))
+    i, j = (int(k) for k in np.unravel_index(np.argmin(left), left.shape))
+    surely = scipy.special.stdtrit(free, 1 - ODD / (count * (count - 1)))
+    return (i, j) if (float(r @ r) / left[i, j] - 1) * free > surely**2 else None
 
 
 def misreading_degC(one: FrequencyFit, other: FrequencyFit, temperature_degC: ArrayLike) -> Array:

@@ -22,6 +22,7 @@ from studies.reports import style
 from studies.reports.digits import lowered, raised
 from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
+ITSELF = 2.0  # times by which a fit improves its own records, from which they do show something
 CHANGES = 0.1  # part of a frequency, more than temperature or trimming ever changes
 LABELS = {
     "training": "fitted, rows",
@@ -31,6 +32,7 @@ LABELS = {
 }
 COEFFICIENTS = "name: Coefficient | value ± error: Value | Unit | ratio: Ratio to ζ₀"
 USELESS = "On held-out data the compensation does not improve the output: beyond its noise, this record shows no cross-damping that varies with temperature."
+ALONE = "Each record is improved by its own fit, but held-out data become worse: the records do not predict each other. Is each right (unit, sign, temperature), of one gyro, and over the temperatures of the others?"
 SCALE = (
     "The output depends only on the product of cross-damping and frequency, so an error of the given frequency scales all coefficients."
     " A constant bias of any other origin is included in ζ₀."
@@ -100,7 +102,7 @@ def fit_cross_damping(
                 ("Residual, held-out data", f"{residual:.3g} {unit}", "rms of 100 s averages"),
                 ("Effect of the filter (9)", f"{dynamic:.2g} {unit}", "largest change that it makes to the correction"),
             ]),
-            None if study.is_useful else Sentence(USELESS, "warning"), left, averaged,
+            None if study.is_useful else Sentence(ALONE if len(data) > 1 and fitted.ratio > ITSELF else USELESS, "warning"), left, averaged,
             Chapter("Output before and after", [
                 Figure(lambda: draw_runs(study.runs, study.model, OUTPUTS[gathered.output], unit), RUNS),
                 Table("Zero-rate output", changes,

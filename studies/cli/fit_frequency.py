@@ -6,7 +6,7 @@ from typing import Annotated
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
-from compensation.frequency import odd_reading
+from compensation.frequency import exchanged_readings, odd_reading
 from studies.cli.arguments import ORDER, POSITIVE, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError, naming
@@ -54,6 +54,11 @@ def fit_frequency(
     """
     T, f, step, sources, soaks = _read_points((table, *more), time_constant, left, order)
     read = ", ".join((table, *more))
+    if pair := exchanged_readings(T, f, order):
+        rows = " and ".join(f"{f[k]:.10g} Hz at {T[k]:g} °C" for k in sorted(pair))
+        raise InputError(
+            f"{read}: {rows} are exchanged: the other way round they lie on the curve of the other readings. Correct the rows."
+        )
     odd, doubt = odd_reading(T, f, order), ""
     if odd is not None and abs(odd[1]) > DIGITS * step:
         k, away = odd

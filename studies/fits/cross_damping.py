@@ -11,6 +11,7 @@ from compensation.errors import CompensationError
 from compensation.improvement import Improvement, compare_outputs, hold_out
 
 LEAST_ROWS = 50
+APART = 3.0  # times what is left of a run that is fitted, from which what is left of it held out contradicts the others
 BLOCKS = 5  # parts into which a single run is cut, each to be predicted from the others
 
 
@@ -54,8 +55,30 @@ def study_cross_damping(
         raise CompensationError("the output is constant: no error varies with temperature; check the column.")
     pieces = runs if len(runs) > 1 else split_run(runs[0], BLOCKS)
     left = hold_out(pieces, compensate)
+    if len(runs) > 1:
+        refuse_contradiction(runs, after, left)
     held_out = compare_outputs([piece.time for piece in pieces], [piece.rate for piece in pieces], left)
     return CrossDampingStudy(model, tuple(runs), training, held_out)
+
+
+def refuse_contradiction(runs: Sequence[RestRun], fitted: Sequence[Array], left: Sequence[Array]) -> None:
+    """Refuse runs that at temperatures of the others are worse for what is fitted to these."""
+    rows = []
+    for k, (run, *outputs) in enumerate(zip(runs, fitted, left, strict=True)):
+        others = np.concatenate([other.temperature for other in [*runs[:k], *runs[k + 1 :]]])
+        shared = (run.temperature >= others.min()) & (run.temperature <= others.max())
+        rows.append(np.stack([run.rate, *outputs])[:, shared])
+    before, used, held_out = np.concatenate(rows, axis=1)
+    if not before.size:
+        return
+    spread, *sizes = (
+        3600 * np.degrees(size) for size in (np.std(before), *(np.sqrt(np.mean(one**2)) for one in (used, held_out)))
+    )
+    if sizes[1] > max(spread, APART * sizes[0]):
+        raise CompensationError(
+            f"they contradict each other: at the same temperatures a fit to the others leaves {sizes[1]:.3g} °/h of a run, {sizes[0]:.3g} where it is fitted"
+            f" and {spread:.3g} without any. Is one in another unit, of the opposite sign or of another gyro? Correct it, or leave it out."
+        )
 
 
 def split_run(run: RestRun, parts: int) -> list[RestRun]:

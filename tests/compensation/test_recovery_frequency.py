@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from compensation.errors import CompensationError
-from compensation.frequency import compare_orders, find_turn, fit_frequency, odd_reading
+from compensation.frequency import compare_orders, exchanged_readings, find_turn, fit_frequency, odd_reading
 from studies.models.kinds.frequency import save_frequency, temperature_error
 
 T = np.linspace(-20, 40, 13)
@@ -127,3 +127,17 @@ def test_planted_a_mistyped_digit_is_found_and_chance_rarely_is():
     assert odd_reading(T, f, 3) == (3, pytest.approx(54.0, abs=0.1))
     tables = 4400 + 0.3 * T + 0.01 * random.standard_normal((20000, T.size))
     assert sum(odd_reading(T, one, 3) is not None for one in tables) < 10
+
+
+@pytest.mark.parametrize("i", range(7))
+def test_recovery_of_two_rows_that_are_exchanged(i):
+    """Each pair of ten; a straight line was sufficient for them, 10 K off. Noise and a warming that is not the cooling exchange none."""
+    T, rng = np.linspace(-40.0, 80.0, 10), np.random.default_rng(i)
+    f = 4432.0 + 0.35 * T - 4e-4 * T**2 + 2e-3 * rng.standard_normal(T.size)
+    assert exchanged_readings(T, f, 3) is None
+    again = np.r_[f, f[::-1] + 0.02 + 2e-3 * rng.standard_normal(T.size)]
+    assert exchanged_readings(np.r_[T, T[::-1]], again, 3) is None
+    for j in range(i + 1, 10):
+        mixed = f.copy()
+        mixed[[i, j]] = f[[j, i]]
+        assert sorted(exchanged_readings(T, mixed, 3)) == [i, j]

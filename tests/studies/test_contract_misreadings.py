@@ -6,19 +6,22 @@ import datetime
 import numpy as np
 import pytest
 
+from compensation.errors import CompensationError
 from compensation.memory import follow_lag
 from studies.calibration.calibrate import calibrate
 from studies.calibration.misreading import check_readings
 from studies.calibration.observed import observe, read_settled
 from studies.errors import InputError
 from studies.fits.bias import study_bias
+from studies.fits.cross_damping import study_cross_damping
 from studies.fits.thermal import fit_thermal_constants
 from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
+from studies.models.kinds.cross_damping import OUTPUTS
 from studies.record import Record, read_record
 from studies.record.one_gyro import records_of_one_gyro
 from studies.record.repeated import drop_repeats
-from studies.record.rest import check_record
+from studies.record.rest import check_record, gather_rest
 from studies.resonator.law import law_of
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import drive_by_profile, drive_by_record
@@ -561,6 +564,21 @@ def test_recovery_of_the_run_and_the_reading_where_one_law_nearly_holds(read, sa
     with pytest.raises(InputError, match=f"^run{k}.csv: {said}[^;]*: read so"):
         records_of_one_gyro(put(four_of_one_gyro(), k, read), print)
     assert len(records_of_one_gyro(four_of_one_gyro(), print)) == 4
+
+
+def test_recovery_of_a_reading_and_a_contradiction_of_two_runs_of_cross_damping():
+    """Both were "no cross-damping that varies with temperature", beside a fit that left a seventh."""
+    pair = four_of_one_gyro()[:2]
+    turned = put(pair, 1, lambda run: spoilt(run, bias_deg_per_h=lambda b: -b))
+    with pytest.raises(InputError, match=r"run0.csv or run1.csv: bias_deg_per_h has the opposite sign"):
+        records_of_one_gyro(turned, print)
+    hot = put(pair, 1, lambda run: spoilt(run, housing_temperature_degC=lambda T: 1.8 * T + 32.0))
+    with pytest.raises(InputError, match=r"^run1.csv: housing_temperature_degC is in °F: read so"):
+        records_of_one_gyro(hot, print)
+    given = {"k": 2 * np.pi * 4432.0, "zeta": 5e-7}
+    assert study_cross_damping(gather_rest(pair, OUTPUTS).runs, **given).is_useful
+    with pytest.raises(CompensationError, match="they contradict each other: at the same temperatures"):
+        study_cross_damping(gather_rest(turned, OUTPUTS).runs, **given)
 
 
 @pytest.mark.parametrize("name", ["frequency_Hz", "bias_deg_per_h", TEMPERATURES[0]])
