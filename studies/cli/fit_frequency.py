@@ -55,9 +55,9 @@ def fit_frequency(
     T, f, step, sources, soaks = _read_points((table, *more), time_constant, left, order)
     read = ", ".join((table, *more))
     if pair := exchanged_readings(T, f, order):
-        rows = " and ".join(f"{f[k]:.10g} Hz at {T[k]:g} °C" for k in sorted(pair))
+        both = " and ".join(f"{f[k]:.10g} Hz at {T[k]:g} °C" for k in sorted(pair))
         raise InputError(
-            f"{read}: {rows} are exchanged: the other way round they lie on the curve of the other readings. Correct the rows."
+            f"{read}: {both} are exchanged: the other way round they lie on the curve of the other readings. Correct the rows."
         )
     odd, doubt = odd_reading(T, f, order), ""
     if odd is not None and abs(odd[1]) > DIGITS * step:
