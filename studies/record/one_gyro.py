@@ -54,8 +54,9 @@ def runs_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -> t
     seen = [without_spikes(record) for record in kept]
     check_one_gyro(seen)
     check_one_unit(seen)
-    check_one_law(seen)
-    if (odd := run_apart(seen)) is not None:
+    odd = run_apart(seen)
+    check_one_law(seen, odd and odd[0])
+    if odd is not None:
         k, away = odd
         said.append(
             f"{_path(kept, k)}: {FREQUENCY} is {away:+.2g} Hz from what the other records have at the same temperatures:"
@@ -114,15 +115,17 @@ def check_one_unit(records: Sequence[Record]) -> None:
                 )
 
 
-def check_one_law(records: Sequence[Record]) -> None:
+def check_one_law(records: Sequence[Record], odd: int | None = None) -> None:
     """Refuse a run that follows the law of the others only with a column read otherwise: in °F, of the opposite sign, exchanged, or moved in time.
 
-    The frequency follows the temperatures, the housing its chamber, and a bias the frequency, or the temperatures where there is none.
+    The frequency follows the temperatures, the housing its chamber, and a bias the frequency, or the temperatures where there is none;
+    one whose frequency lies apart (`odd`) does not.
     """
     bias, drive = _bias_of(records), _drive_of(records)
     own = next((name for name in (FREQUENCY, *DRIVING) if len(_courses(records, name, bias)[1]) > 1), "")
-    for pair in ((drive, FREQUENCY), (CHAMBER, HOUSING), (own, bias)):
+    for pair in ((drive, FREQUENCY), (CHAMBER, HOUSING)):
         _check_pair(records, *pair)
+    _check_pair([record for k, record in enumerate(records) if k != odd], own, bias)
 
 
 def _check_pair(records: Sequence[Record], drive: str, output: str) -> None:

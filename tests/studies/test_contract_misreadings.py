@@ -566,6 +566,15 @@ def test_recovery_of_the_run_and_the_reading_where_one_law_nearly_holds(read, sa
     assert len(records_of_one_gyro(four_of_one_gyro(), print)) == 4
 
 
+@pytest.mark.parametrize("apart", [0.2, 3.2])
+def test_a_bias_of_another_gyro_or_of_one_that_aged_is_not_late(apart):
+    """3.2 Hz of a frequency are a bias that is half an hour late."""
+    others = put(four_of_one_gyro(), 2, lambda run: spoilt(run, frequency_Hz=lambda f: f + apart))
+    said = []
+    assert len(records_of_one_gyro(others, said.append)) == 4
+    assert [sentence[:30] for sentence in said] == ["run2.csv: frequency_Hz is +3.2"] * (apart > 1)
+
+
 def test_recovery_of_a_reading_and_a_contradiction_of_two_runs_of_cross_damping():
     """Both were "no cross-damping that varies with temperature", beside a fit that left a seventh."""
     pair = four_of_one_gyro()[:2]
