@@ -138,7 +138,7 @@ def fit_whole_angle(
 
 def _draw(record: Record, names: dict[str, str]) -> Drawing:
     shown = [name for key, name in names.items() if name in record and key != "angle"]
-    height, x = 0.6 + 1.5 * len(shown), "azimuth, modulo 90° (°)"
+    height, x = 0.6 + 2.0 * len(shown), "azimuth, modulo 90° (°)"
     with style.figure(len(shown), height=height, x=x, y=shown, sharex=True, squeeze=False) as (made, axes):
         for axis, name in zip(axes[:, 0], shown, strict=True):
             shown_values = record[name] - (record.columns.get("rate_deg_per_s", 0.0) if name == RATE else 0.0)
