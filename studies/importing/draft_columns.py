@@ -46,6 +46,7 @@ def draft_column(
         lines.append(f"scale = {stated.scale!r}{check(said + either)}")
     elif target.endswith("_degC") and abs(middle) >= 500:
         lines.append(f"scale = 1.0{check('raw counts? The temperature is reading × scale + offset')}")
+        lines.append(f"offset = 0.0{check('of raw counts')}")
     if stated.offset:
         lines.append(f"offset = {stated.offset:.10g}{check(said)}")
     for key in units[unit].settings:
