@@ -26,6 +26,19 @@ CLOCKS = (
     *("%H.%M.%S", "%H时%M分%S秒"),
 )
 STAMPS = (*map(" ".join, itertools.product(DATES, CLOCKS)), "%Y%m%d%H%M%S", *CLOCKS)
+
+
+def _shape(form: str) -> re.Pattern[str]:
+    """Return what a stamp of a form at least looks like; the others need not be parsed, which takes a hundred times as long."""
+    if form.startswith("%Y"):  # read more freely than it is written
+        return re.compile(r"\s*-.*|[\s+]*\d{4}.*", re.DOTALL)
+    known = {"%b": r"[^\W\d]+\.?", "%p": r"[^\W\d]+\.?", " ": r"\s+"}
+    parts = re.findall(r"%.|.", form)
+    shape = "".join(known.get(one, r"\s*\d+" if one[0] == "%" else re.escape(one)) for one in parts)
+    return re.compile(shape, re.IGNORECASE)
+
+
+SHAPES = {form: _shape(form) for form in STAMPS}
 TIME_WORDS = re.compile(r"time|epoch|unix|elapsed|date|clock|stamp|^t$|^ts\b|\bm?jd\b|julian|\btow\b|^x value$")
 UNITLESS = "housing_temperature_degC"  # whose units no time has
 YEARS = (12784, 25567)  # days from 1970 to 2005 and to 2040, between which a count since an epoch is likely
@@ -121,9 +134,8 @@ def _likely_unit(values: Sequence[float]) -> str:
 
 def _find_stamp(columns: Sequence[str], cells: Mapping[str, list[str]], hint: str) -> tuple[str, str]:
     text = [stamp for row in zip(*(cells[name] for name in columns), strict=True) if (stamp := " ".join(row).strip())]
-    fitting = {
-        form: times for form in STAMPS if text and parse_stamps(text[:1], form) and (times := parse_stamps(text, form))
-    }
+    near = [form for form, shape in SHAPES.items() if text and shape.fullmatch(text[0].replace(",", "."))]
+    fitting = {form: times for form in near if parse_stamps(text[:1], form) and (times := parse_stamps(text, form))}
     elapsed = next((form for form, one in DURATIONS.items() if all(re.fullmatch(one, cell) for cell in text)), "")
     named = re.search("elapsed|duration|relative|run time|mm:ss", f"{hint} {plain(hint)}") is not None
     if elapsed and (named or not fitting):
