@@ -19,17 +19,13 @@ from studies.record.one_gyro import NEXT, OTHERWISE
 
 Runs: TypeAlias = tuple[BellRun, BellRun | None, BellRun | None]
 """Of several rates at one temperature; at rest, and at one rate, over temperature."""
-QUIET = 5.0  # times by which noise at rest and turning, or in the heat, may differ
 Fit: TypeAlias = Callable[[BellRun, BellRun | None, BellRun | None], BellChain]
 
-LATE, ROWS = (
-    2.0,
-    20000,
-)  # s, from which an output counts as late, more than a filter or a rate table is; rows that show it
-CLEAR, FAR = (
-    5.0,
-    5e-3,
-)  # times what the runs leave by themselves, and part of the largest rate, that a contradiction leaves
+QUIET = 5.0  # times by which noise at rest and turning, or in the heat, may differ
+LATE = 2.0  # s, from which an output counts as late, more than a filter or a rate table is
+ROWS = 20000  # rows that show it
+CLEAR = 5.0  # times what the runs leave by themselves, and
+FAR = 5e-3  # part of the largest rate, that a contradiction leaves
 
 
 def check_late(run: BellRun, path: str, output: str) -> None:

@@ -36,9 +36,7 @@ EVEN = 1.5  # times by which a shift that is none of these must be better
 KEPT = 0.6  # likewise, of the rows that a moved run still has
 BEND = 0.1  # of the changes of a frequency: a temperature in another unit would bend its law to its needs
 LAW, ONE, CUBIC = replace(ANY_PATH, bend=BEND), Law(bend=BEND), replace(ANY_PATH, cubic=True)
-SOONER = (
-    100.0  # s, by which a bias at most follows the resonator's own frequency; other parts of the gyro are further lags
-)
+SOONER = 100.0  # s, by which a bias at most follows the resonator's own frequency; other parts are further lags
 
 
 def records_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -> list[Record]:

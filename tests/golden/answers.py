@@ -103,7 +103,9 @@ def changed_lines(was: str, now: str, within: float = 5e-3) -> list[str]:
 
     def near(x: str, y: str) -> bool:
         unit = 10.0 ** int(Decimal(x.replace("−", "-")).as_tuple().exponent)
-        return abs(number(x) - number(y)) <= within * max(abs(number(x)), abs(number(y))) + 1.01 * unit * ("." in x or "e" in x)
+        return abs(number(x) - number(y)) <= within * max(abs(number(x)), abs(number(y))) + 1.01 * unit * (
+            "." in x or "e" in x
+        )
 
     old, new = was.splitlines(), now.splitlines()
     found = [f"{len(old)} -> {len(new)} lines"] if len(old) != len(new) else []
