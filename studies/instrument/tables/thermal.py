@@ -5,7 +5,7 @@ from typing import Annotated
 from studies.instrument.registry import CardTable
 from studies.schema.keys import Keys, Note, number, says
 
-IDENTIFIED_MOUNT = 0.0118  # W/K, for the card hrg-30mm: leaves 5 % of a step at 9 000 s, as its paper says of Figure 3
+IDENTIFIED_MOUNT = 0.0120  # W/K, for the card hrg-30mm: leaves 5 % of a step at 9 000 s, as its paper says of Figure 3
 Length = Annotated[float, number(above=0.0)]
 
 
