@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -59,13 +58,16 @@ FREQUENCY = Variable("frequency", "Hz", "f", 0.0)
 TEMPERATURE = Variable("temperature", "°C", "T", -zero_Celsius)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class AveragedRun:
     """One run averaged over the `blocks` of a fit, and its state over the `fine` ones that a compensation has."""
 
     blocks: Blocks
     fine: Blocks
     variable: Variable
+    _rated: dict[tuple[float, float, bool], tuple[Array, SmoothDerivative]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def behind(self, lag: float) -> Array:
         """Return the state behind a lag (s), which begins settled, averaged over the blocks: (1/w) ∫ x dt of straight lines."""
@@ -80,6 +82,13 @@ class AveragedRun:
         ends = [np.clip(blocks.time + side, time[0], time[-1]) for side in (-half, half)]
         first, last = (np.interp(end, time, area) for end in ends)
         return np.asarray(state[0] + (last - first) / (ends[1] - ends[0]))
+
+    def rated(self, lag: float, window: float, causal: bool) -> tuple[Array, SmoothDerivative]:
+        """Return the state behind a lag with its rate over a window (s); each once, since a search among plays asks for the same."""
+        if (key := (lag, window, causal)) not in self._rated:
+            f = self.behind(lag)
+            self._rated[key] = f, differentiate(self.blocks.time, f, window, causal=causal)
+        return self._rated[key]
 
 
 @dataclass(frozen=True)
@@ -180,7 +189,7 @@ def rate_run(run: AveragedRun, window: float, *, causal: bool, memory: Memory, s
     _check_seconds("window of the rate", window)
     blocks = run.blocks
     window = max(window, 3 * blocks.width, 2.05 * float(np.median(np.diff(blocks.time))))  # three rows, in bursts too
-    f, derivative = _lagged(run, memory.lag, window, causal)
+    f, derivative = run.rated(memory.lag, window, causal)
     play = follow_play(f, memory.play, start) - f
     ok = derivative.complete
     if np.count_nonzero(ok) < 3:
@@ -190,13 +199,6 @@ def rate_run(run: AveragedRun, window: float, *, causal: bool, memory: Memory, s
         bias=blocks.columns["bias"][ok], width=blocks.width, window=window, lag=derivative.lag,
         missing=blocks.missing, spikes=blocks.spikes, variable=run.variable, memory=memory,
     )  # fmt: skip
-
-
-@lru_cache(maxsize=64)
-def _lagged(run: AveragedRun, lag: float, window: float, causal: bool) -> tuple[Array, SmoothDerivative]:
-    """Return the state of a run behind a lag with its rate, which a search among plays asks for again and again."""
-    f = run.behind(lag)
-    return f, differentiate(run.blocks.time, f, window, causal=causal)
 
 
 def _check_seconds(name: str, seconds: float) -> None:

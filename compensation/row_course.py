@@ -26,16 +26,16 @@ class RowCourse:
     known: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, x: Array, doubt: float = CLEAR) -> "RowCourse":
-        """Follow a wave through the rows whose ends are at x; `doubt` is what noise leaves (rad)."""
+    def of(cls, x: Array) -> "RowCourse":
+        """Follow a wave through the rows whose ends are at x."""
         d = np.diff(x)
         before, after = np.append(d[:1], d[:-1]), np.append(d[1:], d[-1:])
         rough = np.abs(after - 2 * d + before) / 8  # half of the largest that a parabola may be off in its middle
         same = np.abs(np.diff(d))
-        level = np.append(same, same[-1:]) < doubt  # turns as the next row, or as the one before
-        level |= np.append(same[:1], same) < doubt
+        level = np.append(same, same[-1:]) < CLEAR  # turns as the next row, or as the one before
+        level |= np.append(same[:1], same) < CLEAR
         beside = np.concatenate([[0.0, 0.0], same[:-1]]) + np.concatenate([same[1:], [0.0, 0.0]])
-        smooth = rough < doubt
+        smooth = rough < CLEAR
         stepped = (beside < STEADY * np.abs(after - before)) & ((d - before) * (after - d) > 0) & ~level
         part = np.where(stepped, (d - after) / np.where(before == after, np.inf, before - after), 0.0)
         u = (NODES + 1) / 2

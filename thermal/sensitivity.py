@@ -126,7 +126,7 @@ class _Slopes:
     """Derivatives at all moments of the grid, found by sweeping."""
 
     def __init__(self, swept: Sweep, steady: Array, changes: Sequence[NetworkChange]) -> None:
-        self.swept, self.changes = swept, changes
+        self.swept = swept
         network, linear = swept.network, swept.linear
         n = self.count = network.count
         everything = swept.everything
@@ -145,26 +145,21 @@ class _Slopes:
         answered = np.zeros_like(forcing)
         for k, first in enumerate(self.first):
             if first is not None:
-                answered[:, :, k] = [first.evaluate(t) - AROUND for t in swept.grid.moments]
+                answered[:, :, k] = [first[0].evaluate(t) - AROUND for t in swept.grid.moments]
                 start[k] = 0.0
         feedback = self._feedback()
         forcing += np.concatenate([answered, held], axis=3) @ feedback
         self.modes, self.mode_rates = swept.grid.answer_with(forcing, feedback[:, :, :n], start)
 
-    def _answer_first(self, change: NetworkChange, start: Array) -> Transient | None:
-        """Return what the linear network answers to boundaries and a start that change, exactly: about a temperature at rest."""
+    def _answer_first(self, change: NetworkChange, start: Array) -> tuple[Transient, dict[str, Profile]] | None:
+        """Return what the linear network answers to boundaries and a start that change, exactly, and these boundaries: about a temperature at rest."""
         if not change.boundaries and change.initial is None:
             return None
-        silent = replace(self.swept.linear, sources=())
-        return propagate(
-            silent, self._about(change), AROUND + start + (0.0 if change.initial is None else change.initial)
-        )
-
-    def _about(self, change: NetworkChange) -> dict[str, Profile]:
-        """Return the boundaries of the change, about a temperature at rest."""
-        ends = self.swept.grid.knots[[0, -1]]
-        moved = {name: Profile(own.time, AROUND + own.value) for name, own in change.boundaries.items()}
-        return {b.name: Profile(ends, np.full(2, AROUND)) for b in self.swept.network.boundaries} | moved
+        grid, linear = self.swept.grid, self.swept.linear
+        held = {b.name: Profile(grid.knots[[0, -1]], np.full(2, AROUND)) for b in linear.boundaries}
+        held |= {name: Profile(own.time, AROUND + own.value) for name, own in change.boundaries.items()}
+        start = AROUND + start + (0.0 if change.initial is None else change.initial)
+        return propagate(replace(linear, sources=()), held, start, grid.modes), held
 
     def _hold(self, change: NetworkChange) -> Array:
         """Changes of the boundaries at all moments, (3, K, boundaries)."""
@@ -209,7 +204,7 @@ class _Slopes:
         for k, first in enumerate(self.first):
             if first is not None:
                 at_rest = AROUND * weights.sum(axis=1)
-                T, dT = _observe_first(self.swept, first, self._about(self.changes[k]), rows, weights)
+                T, dT = _observe_first(self.swept, *first, rows, weights)
                 slope[k] += T - at_rest
                 rate[k] += dT
         return slope, rate

@@ -171,7 +171,7 @@ def run_sweeps(
     modes = find_relaxation(linear, 1.0)
     grid = Grid(knots, modes)
     power = network.power(grid.moments)
-    first = propagate(linear, boundaries, T0)
+    first = propagate(linear, boundaries, T0, modes)
     start = np.zeros((1, network.count))
     moments = grid.moments
     T1 = np.array([first.evaluate(t) for t in moments])

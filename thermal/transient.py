@@ -10,7 +10,7 @@ from thermal.errors import ThermalError
 from thermal.lag import scan
 from thermal.network import Array, Network
 from thermal.profile import Profile
-from thermal.relaxation import find_relaxation
+from thermal.relaxation import Relaxation, find_relaxation
 from thermal.steady import boundary_forcing, find_corners, initial_state
 
 BLOCK = 1 << 16  # rows evaluated at a time; bounds the memory of long outputs
@@ -56,15 +56,20 @@ class Transient:
         return sums
 
 
-def propagate(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
-    """Propagate a linear network exactly through piecewise linear boundaries and powers, from `initial` or the first steady state.
+def propagate(
+    network: Network,
+    boundaries: Mapping[str, Profile],
+    initial: ArrayLike | None = None,
+    modes: Relaxation | None = None,
+) -> Transient:
+    """Propagate a linear network exactly through piecewise linear boundaries and powers, from `initial` or the first steady state; `modes` are its own, where they are known.
 
     Modes x = shapesᵀ C T obey dx/dt = −λ x + u₀ + u₁ s: x = u₀/λ − u₁/λ² + (u₁/λ) s + c e^(−λ s) after a corner.
     """
     if not network.is_linear:
         raise ThermalError("exact only without radiation and with constant capacities; linearise the network or integrate it.")  # fmt: skip
     knots = find_corners(network, boundaries)
-    modes = find_relaxation(network, 1.0)  # a linear network has the same modes at every temperature
+    modes = modes or find_relaxation(network, 1.0)  # a linear network has the same modes at every temperature
     rate, shapes = 1 / modes.time_constants, modes.shapes
     value, slope = boundary_forcing(network, boundaries, knots[:-1])
     trend = (slope @ modes.coupling.T + network.power(knots[:-1], 1)) @ shapes

@@ -58,6 +58,11 @@ class Acceptance:
     noisiest: str  # drift record that these two are of
 
     @property
+    def several_drifts(self) -> bool:
+        """Whether more than one record tells the drift."""
+        return sum(test == "drift" for test in self.used.values()) > 1
+
+    @property
     def verdict(self) -> Literal["pass", "fail", "incomplete"]:
         """Fail where one limit is not met; incomplete where one is undecided or without a record; else pass."""
         kinds = {line.verdict for line in self.lines if line.limit is not None}

@@ -15,7 +15,7 @@ from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.record import TABLE_COLUMNS, Record, Run, place_in_time, read_frequency_table, reading_resolution
 from studies.simulation.drive import COLUMN, Drive, drive_by_record
-from studies.simulation.holes import PARTS
+from studies.simulation.holes import each_part
 
 Rows = NDArray[np.intp]
 RESPONSES = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
@@ -203,8 +203,7 @@ def _observe(record: Record, start: float, named: Sequence[str], turning: bool, 
     if not any(name in responses for name in named):
         raise InputError(f"{record.path}: none of {', '.join(named)} has values; there is nothing to calibrate with.")
     kinks = {} if outer is None else _find_kinks(inner, outer)
-    kinks |= {k + part: size for k, size in inner.holes.items() for part in range(PARTS)}
-    return ObservedRun(record, inner, outer, responses, kinks)
+    return ObservedRun(record, inner, outer, responses, kinks | each_part(inner.holes))
 
 
 def _check_holes(record: Record) -> None:

@@ -91,7 +91,7 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     note = "A limit is judged only if the whole interval lies on one side of it. An upper limit applies to the magnitude."  # fmt: skip
     if any(row["section"] == "12.9" and not row["needs"] for row in rows):
         note += " The scale factor is that of the straight line; its error is that of the noise while a rate is held and, where they scatter more, of rates held again: without such a record errors from hold to hold are not known."
-    if sum(kind == "drift" for kind in found.used.values()) > 1:
+    if found.several_drifts:
         note += (
             " Noise coefficients are the largest of the drift records that are at least half as long as the longest."
         )
@@ -166,6 +166,5 @@ def _drift(found: Acceptance) -> list[Figure | Sentence]:
             return made
 
     label = "overlapping Allan deviation, 90 % interval; dashed: N, B, K"
-    several = sum(kind == "drift" for kind in found.used.values()) > 1
-    caption = f"Allan deviation of {found.noisiest}{', the drift record with the largest bias instability' if several else ''}."
+    caption = f"Allan deviation of {found.noisiest}{', the drift record with the largest bias instability' if found.several_drifts else ''}."
     return [Figure(draw, caption, "Allan deviation over averaging time, both logarithmic."), Sentence(words)]

@@ -252,12 +252,12 @@ def _with_estimates(instrument: Instrument, estimates: dict[str, dict[str, float
 
 def _keep(instrument: Instrument, estimates: dict[str, dict[str, float]], save: str | None, against: str) -> str | None:
     """Save the card with the estimates, unless the fit or a bound of a value speaks against it; return where it is."""
-    if save is None or against:
-        return keep_card(instrument, save, against)
-    try:
-        return keep_card(_with_estimates(instrument, estimates), save)
-    except InputError as why:
-        return keep_card(instrument, save, f"an estimate can be none of a card ({why})")
+    if save and not against:
+        try:
+            instrument = _with_estimates(instrument, estimates)
+        except InputError as why:
+            against = f"an estimate can be none of a card ({why})"
+    return keep_card(instrument, save, against)
 
 
 def _in_card_units(part: dict[str, Estimate], found: WaveFit, record: Record) -> dict[str, dict[str, float]]:

@@ -22,6 +22,7 @@ import numpy as np
 import scipy
 
 from compensation.arrays import Array
+from compensation.regression import fit_linear
 from studies.fleet.device import Measured
 
 # Scatters that are tried, in parts of the range of the values: three may stand close by chance.
@@ -176,11 +177,11 @@ class Quantity:
         value, sd = self._arrays(own)
         w = 1.0 / np.hypot(max(self.population.scatter, 1e-3 * float(sd.max())), sd)
         X = np.column_stack([np.ones_like(days), (days - days.mean()) / MONTH]) * w[:, None]
-        (_, slope), (left, *_), *_ = np.linalg.lstsq(X, value * w)
-        free = len(own) - 2
-        error = float(np.sqrt(np.linalg.inv(X.T @ X)[1, 1] * left / free))
-        chance = 2.0 * float(scipy.special.stdtr(free, -abs(slope) / max(error, 1e-300))) * self.looks / len(self.of)
-        return Trend(float(slope), error, chance) if chance < CHANCE else None
+        fit = fit_linear(X, value * w, ("mean", "date"), constant=False)
+        slope, error = float(fit.coefficients[1]), float(fit.standard_errors[1])
+        far = abs(slope) / max(error, 1e-300)
+        chance = 2.0 * float(scipy.special.stdtr(fit.degrees_of_freedom, -far)) * self.looks / len(self.of)
+        return Trend(slope, error, chance) if chance < CHANCE else None
 
     @property
     def odd(self) -> dict[str, float]:

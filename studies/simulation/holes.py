@@ -1,6 +1,6 @@
 """Holes of a measured temperature: the curve that bridges them, and how far it may be off."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -58,6 +58,17 @@ def _slopes_beside(t: Array, T: Array, k: int, usual: float) -> tuple[float, flo
         low, high = sorted((0.0, STEEPEST * mean))
         found.append(float(np.clip(slope, low, high) - mean))
     return found[0], found[1]
+
+
+def each_part(holes: Mapping[int, float]) -> dict[int, float]:
+    """Return how far each part of the holes may be off, by the row after it."""
+    return {k + part: size for k, size in holes.items() for part in range(PARTS)}
+
+
+def longest_hole(profile: Profile, holes: Iterable[int]) -> tuple[float, float]:
+    """Return the width (s) of the widest hole of a bridged profile, and the time (s) after which it is."""
+    t = profile.time
+    return max((float(t[k + PARTS - 1] - t[k - 1]), float(t[k - 1])) for k in holes)
 
 
 def straight(profile: Profile, holes: Iterable[int]) -> Profile:

@@ -18,7 +18,7 @@ from studies.record import Record, check_plausible
 from studies.resonator.law import beyond_records, unknown_slope
 from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
-from studies.simulation.holes import PARTS
+from studies.simulation.holes import longest_hole
 from studies.simulation.loop import find_range_use, require_range, require_stable_loops, wave_of
 from studies.simulation.noise import bias_noise, frequency_noise, quantise
 from studies.simulation.prediction import Prediction, law_for, predict
@@ -141,8 +141,7 @@ def simulate_run(
     if why := unknown_slope(instrument):
         warnings += (f"the frequency follows no temperature: {why}",)
     if drive.holes:
-        t = drive.profile.time
-        longest, after = max((t[k + PARTS - 1] - t[k - 1], t[k - 1]) for k in drive.holes)
+        longest, after = longest_hole(drive.profile, drive.holes)
         several = len(drive.holes) > 1
         size = f"{numbered(len(drive.holes), 'hole')}, the longest" if several else "a hole"
         bridged = "smooth curves bridge them" if several else "a smooth curve bridges it"
