@@ -294,3 +294,11 @@ def build_law(
     return FrequencyLaw(
         material, reference_temperature, lowest, highest, theory, harmonic, shape, mode, Prestress(mode), mount
     )
+
+
+def mode_uncertainty(mode: Mode, material: Material, reference_temperature: float, temperature: float) -> float:
+    """Return the standard deviation of ln f of a mode solved at a temperature (K), by the material's prior."""
+    shape = shape_of(mode, mode.resonator, material.elastic(temperature))
+    at = (reference_temperature, temperature, temperature)
+    law = FrequencyLaw(material, *at, mode.theory, mode.harmonic, shape, mode, Prestress(mode))
+    return float(law.uncertainty(temperature))

@@ -52,6 +52,7 @@ class Material:
     constant: tuple[str, ...] = ()  # properties given at one temperature only: nobody says how they change with it
     crystal: Crystal | None = None  # whose mean over all directions the elastic properties are
     unchecked: tuple[str, ...] = ()  # what could not be compared with an open source, a property, or elastic constants
+    known: Prior | None = None  # what is known of it instead of by its law
 
     @property
     def caveats(self) -> tuple[str, ...]:
@@ -138,7 +139,9 @@ class Material:
 
     @cached_property
     def prior(self) -> Prior:
-        """What the law leaves open; coefficients that nothing makes uncertain are not in it."""
+        """What the law leaves open, or what is known instead; coefficients that nothing makes uncertain are not in it."""
+        if self.known is not None:
+            return self.known
         names = [f"{p}.{one}" for p in self.properties for one in coefficient_names(p)]
         covariance = np.zeros((len(names), len(names)))
         for k, found in enumerate(self.properties.values()):

@@ -11,19 +11,18 @@ have `crystal`: `antinode_along_100_Hz`, `other_Hz`, `split_Hz`, `relative_split
 from math import degrees
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
-
 from shell.constants import zero_Celsius
 from shell.errors import ShellError
+from shell.law import mode_uncertainty
 from shell.modes import Mode, solve_modes
 from shell.prestress import Prestress, check_mount
 from studies.cli.arguments import COUNT, FRACTION, MANY, WHOLE, AnyTheory, Card, Temperature, open_resonator
 from studies.cli.output import answers
 from studies.errors import naming
 from studies.instrument.card import Instrument
+from studies.instrument.material_values import known_material
 from studies.reports.digits import to_numerical_error
 from studies.reports.scenes import THEORIES, live_chapter, show_mode, view_blocks
-from studies.resonator.law import law_of
 from studies.results import Column, Result, Sentence, Table, Where, row_of
 
 if TYPE_CHECKING:
@@ -99,7 +98,7 @@ def modes(
             m for n in dict.fromkeys(harmonic) for m in solve_modes(resonator, elastic, n, count, theory, tolerance)
         ]
         more = [_effects(m, instrument, T, tolerance) for m in found]
-    share = float(law_of(instrument, T, T).uncertainty(np.array([T]))[0])
+    known, T0 = known_material(instrument), instrument.reference_temperature
     mean = float(sum(h for _, h in resonator.thickness) / len(resonator.thickness))
     entries = []
     for m, effects in zip(found, more, strict=True):
@@ -109,7 +108,7 @@ def modes(
             # of a wall that grows everywhere by the same part
             per_micrometre = float(m.frequency * m.sensitivities.thickness / mean * 1e-6)
             entry |= {
-                "material_uncertainty_Hz": share * m.frequency if share else None,
+                "material_uncertainty_Hz": m.frequency * mode_uncertainty(m, known, T0, T) or None,
                 "frequency_per_thickness_Hz_per_um": per_micrometre,
                 **row_of(m, "sensitivities", "energy_fractions", modal_mass_kg="modal_mass"),
             }
@@ -125,7 +124,7 @@ def modes(
         f"Modes of {instrument.name}",
         f"Natural frequencies and Bryan factors at {T - zero_Celsius:g} °C, {THEORIES[theory]}.",
         [
-            Table(name, entries, COLUMNS, _note(theory, share)),
+            Table(name, entries, COLUMNS, _note(theory, bool(known.prior.names))),
             *_effect_tables(entries),
             *_all_orders(entries),
             Table("Derivatives of ln f", shown, SLOPES, DERIVED, where),
@@ -226,11 +225,12 @@ def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -
     return view_blocks([show_mode(instrument, n, temperature=T, theory=drawn) for n in harmonics], words)
 
 
-def _note(theory: str, share: float) -> str:
+def _note(theory: str, open_: bool) -> str:
     if theory == "rayleigh":
         return "Rayleigh's closed form ignores the free edge: on a hemisphere it lies about 10 % too high. Its error is not estimated more closely."
-    known = "from the published values of the material, one standard deviation"
-    spread = known if share else "not known: the card gives none"
+    spread = (
+        "as card and material table state it, one standard deviation" if open_ else "not known: the card gives none"
+    )
     return f"Solver error: against the exact solution of the same theory. Material uncertainty: {spread}."
 
 

@@ -56,7 +56,9 @@ def tcf(
         "relative_error": law.error, "points": points, "prior": moves, "measured": local,
     }  # fmt: skip
     parts = [name for name in PARTS if name != "base" or law.mount]
-    note = f"Slopes in ppm/°C; ±: one standard deviation, from the stated uncertainty of the material law ({instrument.material.law})."
+    note = (
+        f"Slopes in ppm/°C; ±: one standard deviation, as card and material law ({instrument.material.law}) state it."
+    )
     if law.mount:
         note += " Base: stress from the thermal mismatch of the card's [mount]."
     columns = [

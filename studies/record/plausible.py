@@ -61,11 +61,11 @@ def _frequency(instrument: Instrument, law: "FrequencyLaw | None" = None) -> flo
 
 
 def _spread(instrument: Instrument, own: float) -> float:
-    """Relative standard deviation of the card's frequency, by its material's law and by the numbers that it states."""
+    """Relative standard deviation of the card's frequency, by its material and by its dimensions."""
     T = instrument.reference_temperature
     squares = float(law_of(instrument, T, T).uncertainty(np.array([T]))[0]) ** 2
     for value in instrument.uncertain:
-        if value.name.startswith(("resonator.", "material.", "law.f0")) and ".deviation." not in value.name:
+        if value.name.startswith(("resonator.", "law.f0")):
             moved = min(value.value + value.sd, value.high)
             moved = moved if moved > value.value else max(value.value - value.sd, value.low)
             squares += float(np.log(_frequency(instrument.with_values({value.name: moved})) / own)) ** 2

@@ -69,6 +69,7 @@ def compare(instruments: "Sequence[Instrument]") -> Comparison:
 
 
 def _figures(instrument: "Instrument") -> Iterator[Figure]:
+    from shell.law import mode_uncertainty
     from shell.modes import nearest_mode, solve_modes
     from studies.simulation.heat_path import behind_housing, build_network, slowest_lag
 
@@ -77,9 +78,10 @@ def _figures(instrument: "Instrument") -> Iterator[Figure]:
         lowest = {n: solve_modes(*instrument.at(T0), n)[0] for n in HARMONICS}
         nearest = nearest_mode(lambda n, count: solve_modes(*instrument.at(T0), n, count), lowest[DRIVE])
         law = law_of(instrument, T0 - 1.0, T0 + 1.0)
-    drive, share = lowest[DRIVE], float(law.uncertainty(np.array([T0]))[0])
+    drive = lowest[DRIVE]
     for n, mode in lowest.items():
-        yield Figure(f"frequency, n = {n}", "Hz", mode.frequency, share * mode.frequency)
+        own = mode.frequency * mode_uncertainty(mode, law.material, T0, T0)
+        yield Figure(f"frequency, n = {n}", "Hz", mode.frequency, own)
     of = f"n = {nearest.harmonic}, index {nearest.index}"
     yield Figure("nearest other mode", "Hz", nearest.frequency - drive.frequency, nothing, of)
     yield Figure("Bryan factor", "1", drive.bryan_factor, nothing)

@@ -11,6 +11,7 @@ from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from studies.errors import InputError, naming
 from studies.instrument.card import load_card
+from studies.instrument.material_values import known_material
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
@@ -31,15 +32,8 @@ def law_of(
         return cast("FrequencyLaw", instrument.polynomial.between(lowest, highest))
     from shell.law import build_law
 
-    T0, material, mount = instrument.reference_temperature, instrument.material, mount_of(instrument, theory, harmonic)
-    given = next((one for one in instrument.uncertain if one.name == "material.poisson_ratio"), None)
-    if given is None:
-        return build_law(instrument.resonator, material, T0, lowest, highest, theory, harmonic, mount)
-    # A given Poisson's ratio that is uncertain: the law is solved for the ratios that it may have.
-    ratio = replace(material.properties["poisson_ratio"], unsettled=(given.sd, 0.0, 0.0))
-    open_one = replace(material, properties={**material.properties, "poisson_ratio": ratio})
-    law = build_law(instrument.resonator, open_one, T0, lowest, highest, theory, harmonic, mount)
-    return law.with_material(material)
+    T0, mount = instrument.reference_temperature, mount_of(instrument, theory, harmonic)
+    return build_law(instrument.resonator, known_material(instrument), T0, lowest, highest, theory, harmonic, mount)
 
 
 def mount_of(instrument: "Instrument", theory: "Theory", harmonic: int) -> "Mount | None":

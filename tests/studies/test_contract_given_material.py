@@ -1,5 +1,7 @@
 """A material given at one temperature: its slope is not known, and no command prints it as 0."""
 
+import math
+
 import pytest
 
 from studies.cli import main
@@ -78,3 +80,29 @@ def test_a_wrong_key_is_shown_with_its_line(card, capsys, more, line):
     card.write_text(CARD + more)
     assert main(["cards", str(card)]) == 2
     assert capsys.readouterr().err.endswith(f" ({card}:{line})\n")
+
+
+@pytest.mark.parametrize("name", ["my-steel", "fused-silica"])  # the law of silica states shear modulus and ratio
+def test_given_values_make_every_mode_as_uncertain_as_they_say(card, ask, name):
+    """f ∝ √(E/ρ); by Poisson's ratio each mode has its own slope, here from two solves."""
+    text = CARD.replace("my-steel", name).replace("190.0", "{ value = 190.0, sd = 19.0 }")
+
+    def modes(ratio):
+        card.write_text(text.replace("8000.0", "{ value = 8000.0, relative_sd = 0.02 }").replace("0.3\n", ratio))
+        return ask(["modes", card, "--harmonic", "1", "2", "3"])["modes"]
+
+    found, below, above = modes("{ value = 0.3, sd = 0.05 }\n"), modes("0.29\n"), modes("0.31\n")
+    for mode, low, high in zip(found, below, above, strict=True):
+        by_nu = 0.05 * math.log(high["frequency_Hz"] / low["frequency_Hz"]) / 0.02
+        expected = mode["frequency_Hz"] * math.hypot(0.5 * 0.1, 0.5 * 0.02, by_nu)
+        assert mode["material_uncertainty_Hz"] == pytest.approx(expected, rel=1e-3)
+
+
+def test_stated_slopes_make_that_of_the_frequency_as_uncertain_as_they_say(card, ask):
+    """d ln f/dT = ½ (E′/E + α) of a free shell."""
+    card.write_text(
+        f"{CARD}[material.deviation]\nyoungs_modulus.log_slope_per_K = {{ value = {E_SLOPE}, sd = 4e-6 }}\n"
+        f"expansion.value = {{ value = {EXPANSION}, sd = 3e-6 }}\n"
+    )
+    for point in ask(["tcf", card, "--from", "0", "--to", "40"])["points"]:
+        assert point["uncertainty_ppm_per_degC"] == pytest.approx(2.5, rel=1e-6)
