@@ -32,11 +32,11 @@ SETTLED, MOST = 1e-14, 60  # rad, of the azimuth from one round to the next; rou
 
 def turn_settled(
     wave: StandingWave, electronics: Electronics, time: ArrayLike, *, rate: ArrayLike | AppliedRate = 0.0,
-    precession: ArrayLike = 0.0, angle: float = 0.0, wander: ArrayLike = 0.0,
+    precession: ArrayLike = 0.0, angle: float = 0.0, wander: ArrayLike = 0.0, means: bool = True,
 ) -> LoopRun:  # fmt: skip
     """Return the output of settled loops for a wave that `rate` and `precession` (rad/s, linear) turn from `angle`, and `wander`, noise of the rate, each row's mean.
 
-    The run's `angle` is that at rows, all else means to the next; of the last, its value.
+    The run's `angle` is that at rows, all else means to the next; of the last, and without `means` of every row, its value.
     """
     t = np.asarray(time, dtype=float)
     if t.ndim != 1 or not (np.diff(t) > 0).all():
@@ -45,6 +45,8 @@ def turn_settled(
     commanded, shaken = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (precession, wander))
     applied, start = AppliedRate.of(rate, t), electronics.shown(wave.harmonic, angle)
     theta, nodes = _integrate(rows, electronics, t, applied, commanded, start, rows.bryan_factor * shaken)
+    if not means:
+        return settle_rebalance(wave, electronics, applied.at(t), theta, precession=precession)
     given = np.interp(nodes.row + nodes.part, np.arange(len(t)), commanded)
     found = settle_rebalance(nodes.wave(rows), electronics, nodes.rate, nodes.angle, precession=given)
     return replace(nodes.means(found, len(t)), time=t, angle=theta)

@@ -11,9 +11,8 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError
-from studies.files.columns import read_header
 from studies.instrument.card import Card, Instrument, load_card
-from studies.record import Record, Run, read_record
+from studies.record import Record, Run, is_table, read_record
 
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
@@ -164,9 +163,3 @@ def _flat(given: Iterable[Any]) -> Iterator[Any]:
             yield from one
         else:
             yield one
-
-
-def is_table(run: Run) -> bool:
-    """Return whether it is a steady-state table (temperature_degC, no time_s)."""
-    names = ["time_s"] if isinstance(run, Record) else read_header(run)
-    return "time_s" not in names and "temperature_degC" in names

@@ -12,6 +12,7 @@ from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.inversion.readings import is_mode_table
 from studies.progress import Told
+from studies.record import is_table
 from studies.reports import calibration as parts
 from studies.results import Result, row_of
 
@@ -44,7 +45,7 @@ def calibrate(
         if len(data) > 1 or hold_out:
             raise InputError(f"{tables[0]}: a table of modes is calibrated alone and without --hold-out; save that card, then calibrate it with the records.")  # fmt: skip
         return calibrate_modes(instrument, tables[0], save, exact)
-    records = sum(not workbench.is_table(path) for path in data)
+    records = sum(not is_table(path) for path in data)
     if not 0 <= hold_out <= records:
         there = "is 1 record" if records == 1 else f"are {records} records"
         raise InputError(f"--hold-out {hold_out}: there {there}, numbered from 1.")

@@ -8,13 +8,13 @@ from cyclopts import Parameter
 from studies import workbench
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
-from studies.files.columns import read_header
 from studies.instrument.card import load_card
 from studies.planning.chamber import Chamber, parse_chamber
 from studies.progress import Told
-from studies.record import OUTPUTS, read_record
+from studies.record import OUTPUTS, is_table, read_record
 from studies.reports.diagnosis import diagnosis_parts, headline
 from studies.results import Result
+from studies.simulation.chamber import columns_of
 
 PLANNED = "hrg-30mm"  # card of a plan without --card
 STAGES = {
@@ -53,7 +53,7 @@ def diagnose(
         return _plan([*plan, *runs], card, limits)
     if not runs:
         raise InputError("no records given: hrg diagnose RUN.csv [RUN.csv ...].")
-    tables = [path for path in runs if workbench.is_table(path)]
+    tables = [path for path in runs if is_table(path)]
     if not tables:
         return _campaign(runs, card, (limits or Chamber()) if next_ or limits else None, save)
     if len(runs) > 1:
@@ -68,7 +68,7 @@ def _plan(profiles: list[str], card: str | None, limits: Chamber | None) -> Resu
     from studies.reports import plan as parts
 
     for path in profiles:
-        header = read_header(path) if Path(path).is_file() else []
+        header = columns_of(path)
         if set(OUTPUTS) & set(header):
             what = "record of a run" if "time_s" in header else "steady-state table"
             raise InputError(f"{path}: this is a {what}; --plan takes profiles of runs to come. Leave out --plan to diagnose it; of records, --next then proposes a run.")  # fmt: skip

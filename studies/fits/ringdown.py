@@ -125,16 +125,19 @@ def _told(path: str | Path, notes: Mapping[str, float], found: RingDown, doubts:
 
 def is_decay(path: str | Path) -> bool:
     """Return whether a file is a decay or a spectrum by its columns, and not a record."""
-    if read_bytes(path, first=1) == b"%":
-        return True
-    return bool(set(read_header(path)) & (set(KNOWN) - {"time_s", "frequency_Hz"}))
+    header = header_of(path)
+    return not header or bool(header & (set(KNOWN) - {"time_s", "frequency_Hz"}))
+
+
+def header_of(path: str | Path) -> set[str]:
+    """Return the columns of a file; a trace with % comments has no header."""
+    return set() if read_bytes(path, first=1) == b"%" else set(read_header(path))
 
 
 def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
     """Return the table and the numbers of its comments; traces with % comments have two columns and no header."""
-    if read_bytes(path, first=1) == b"%":
+    if not (header := header_of(path)):
         return _read_trace(path)
-    header = set(read_header(path))
     spectrum = "frequency_Hz" in header and bool(header & set(POWERS))
     table = read_columns(path, KNOWN, ["frequency_Hz" if spectrum else "time_s"])
     if spectrum:

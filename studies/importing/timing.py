@@ -43,7 +43,7 @@ TIME_WORDS = re.compile(r"time|epoch|unix|elapsed|date|clock|stamp|^t$|^ts\b|\bm
 UNITLESS = "housing_temperature_degC"  # whose units no time has
 YEARS = (12784, 25567)  # days from 1970 to 2005 and to 2040, between which a count since an epoch is likely
 DAY = datetime.timedelta(days=1)
-LONGEST_RUN = 1000.0  # days of a file whose times look like days
+LIKELY_DAYS = 1000.0  # that a file lasts whose times look like days
 USUAL_STEP = (1e-3, 3600.0)  # s between rows
 
 
@@ -108,7 +108,7 @@ def find_epoch(name: str, values: Sequence[float], of: float | None) -> tuple[st
         for form, (size, begun, words) in EPOCHS.items()
         if of in (None, size)
         and YEARS[0] < (first - begun) * size / 86400.0 < YEARS[1]
-        and (size < 86400.0 or (last - first < LONGEST_RUN and any(value % 1 for value in values)))
+        and (size < 86400.0 or (last - first < LIKELY_DAYS and any(value % 1 for value in values)))
     }
     if not fitting:
         return None

@@ -9,8 +9,8 @@ import numpy as np
 from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.errors import InputError
-from studies.files.columns import read_columns, read_header
-from studies.record import Record, Run, refuse_kilohertz
+from studies.files.columns import read_columns
+from studies.record import Run, names_of, refuse_kilohertz
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -40,7 +40,7 @@ class ModeReadings:
 
 def is_mode_table(path: Run) -> "TypeGuard[str | Path | DataFrame]":
     """Return whether it is a table of modes."""
-    names = ["time_s"] if isinstance(path, Record) else read_header(path)
+    names = names_of(path)
     return "time_s" not in names and not {"harmonic", "index", "sd_Hz"}.isdisjoint(names)
 
 

@@ -162,11 +162,22 @@ def place_in_time(records: Sequence[Record]) -> tuple[list[float], bool]:
     return offsets, False
 
 
+def names_of(run: Run) -> list[str]:
+    """Return the columns of a run or a table, without reading its numbers."""
+    return [*run.columns] if isinstance(run, Record) else read_header(run)
+
+
+def is_table(run: Run) -> bool:
+    """Return whether it is a steady-state table (temperature_degC, no time_s)."""
+    names = names_of(run)
+    return "time_s" not in names and "temperature_degC" in names
+
+
 def read_record(path: "Run") -> Record:
     """Read one run: from a file, or from a table as `to_frame` gives it; a record is what it is."""
     if isinstance(path, Record):
         return path
-    if "time_s" not in (names := read_header(path)) and "temperature_degC" in names:
+    if is_table(path):
         raise InputError(
             f"{path if isinstance(path, str | Path) else 'table'}: this is a steady-state table (no time_s), but a record in time is needed."
         )

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from compensation.ringdown.laws import Law, Rows, fit_law
 from studies.errors import InputError, naming
-from studies.files.columns import read_columns, read_header
-from studies.files.reading import read_bytes
-from studies.fits.ringdown import Decay
+from studies.files.columns import read_columns
+from studies.fits.ringdown import Decay, header_of
 from studies.record import COLUMNS as RUN
 from studies.record import POWERS, Record, check_plausible, write_record
 
@@ -42,15 +41,13 @@ class Decays:
 
 def is_table(path: str | Path) -> bool:
     """Return whether a file is a table of decays."""
-    if read_bytes(path, first=1) == b"%":
-        return False
-    header = set(read_header(path))
+    header = header_of(path)
     return bool(header & set(RESPONSES)) and not header & set(POWERS)
 
 
 def read_table(path: str | Path) -> Decays:
     """Read a table of decays."""
-    if others := sorted(set(read_header(path)) & set(RUN) - set(COLUMNS)):
+    if others := sorted(header_of(path) & set(RUN) - set(COLUMNS)):
         raise InputError(f"{path}: the column {others[0]} is one of a run, and this command takes free decays: give a run to hrg calibrate or hrg diagnose; of a table of decays leave it out.")  # fmt: skip
     table = read_columns(path, COLUMNS)
     check_plausible(table.values, table.place)

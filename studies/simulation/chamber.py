@@ -41,7 +41,7 @@ def load_schedule(text: "str | Record") -> "tuple[Profile, Mapping[str, NDArray[
     from studies.simulation.drive import COMMAND_COLUMNS
     from thermal.profile import Profile
 
-    columns = _columns_of(text)
+    columns = columns_of(text)
     commands = [name for name in columns if name in COMMAND_COLUMNS]
     if not commands or not set(PROFILE_COLUMNS) <= set(columns):
         return load_profile(text), {}
@@ -67,7 +67,7 @@ def load_drive(text: "str | Record", boundary: "Boundary | None" = None, rate: f
     if boundary == "housing":
         raise InputError(f"{text}: only a record has a housing column to impose; leave out --boundary housing.")
     chamber, commands = load_schedule(text)
-    moment = read_record(text).moment if _columns_of(text) else None
+    moment = read_record(text).moment if columns_of(text) else None
     if not commands and moment is None:
         return chamber
     return replace(drive_by_schedule(chamber, commands, rate), moment=moment, source=str(text))
@@ -78,17 +78,15 @@ def is_record(text: "str | Record") -> bool:
     from studies.record import PROFILE_COLUMNS
     from studies.simulation.drive import COMMAND_COLUMNS
 
-    columns = set(_columns_of(text))
+    columns = set(columns_of(text))
     return bool(columns) and not set(PROFILE_COLUMNS) <= columns <= {*PROFILE_COLUMNS, *COMMAND_COLUMNS}
 
 
-def _columns_of(text: "str | Record") -> list[str]:
+def columns_of(text: "str | Record") -> list[str]:
     """Return the columns of a record or a file; words have none."""
-    from studies.files.columns import read_header
+    from studies.record import names_of
 
-    if not isinstance(text, str):
-        return [*text.columns]
-    return read_header(text) if os.path.isfile(text) else []
+    return names_of(text) if not isinstance(text, str) or os.path.isfile(text) else []
 
 
 def check_profile(profile: "Profile", instrument: "Instrument") -> None:

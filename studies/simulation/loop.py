@@ -209,8 +209,9 @@ def settled_columns(
     elif time is None:
         run = settle_rebalance(wave, electronics, applied, angle, precession=precession)
     elif pattern_angle is None:
-        run = turn_settled(wave, electronics, time, rate=rate, precession=precession, angle=start, wander=wander)
-        run = run if means else settle_rebalance(wave, electronics, applied, run.angle, precession=precession)
+        run = turn_settled(
+            wave, electronics, time, rate=rate, precession=precession, angle=start, wander=wander, means=means
+        )
     elif means:  # whatever was commanded has turned it so
         run = read_turned(wave, electronics, time, angle, rate=rate)
     else:

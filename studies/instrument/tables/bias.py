@@ -62,8 +62,8 @@ class Bias(Keys, frozen=True, kw_only=True):
         if wave is None:
             axis = np.exp(2j * harmonic * np.radians(self.damping_axis_deg))
             wave = np.asarray(self.damping_anisotropy * inverse_q * axis)
-        split, axis = np.pi * frequency * np.abs(wave), np.angle(wave) / (2 * harmonic)  # Δ(1/τ) and θ_τ
-        drift = split * np.sin(2 * harmonic * (theta - axis)) / (2 * harmonic * bryan_factor)
+        turned = np.imag(np.conj(wave) * np.exp(2j * harmonic * theta))  # Δ(1/Q) sin 2n(θ − θ_τ)
+        drift = np.pi * frequency * turned / (2 * harmonic * bryan_factor)
         return np.asarray(self.polynomial(change, rate) + DEG_PER_H * drift)
 
     def polynomial(self, change: Array, rate: Array) -> Array:
