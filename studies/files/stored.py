@@ -60,6 +60,6 @@ class Stored:
         return search(range(self._rows), value, key=self.at)
 
 
-def portions(count: int) -> Iterator[slice]:
-    """Yield the portions of so many rows."""
-    return (slice(begin, min(begin + PORTION, count)) for begin in range(0, count, PORTION))
+def portions(count: int, before: int = 0) -> Iterator[slice]:
+    """Yield the portions of so many rows, each with the rows `before` it."""
+    return (slice(max(begin - before, 0), min(begin + PORTION, count)) for begin in range(0, count, PORTION))

@@ -53,12 +53,11 @@ def stamp_clock(key: str, read: Callable[[int, int], Any], utc: bool) -> Clock |
 def even_clock(about: Mapping[str, Any]) -> Clock | None:
     """Return the clock that properties such as dt, wf_increment or sample_rate state."""
     known = {str(name).lower(): value for name, value in about.items()}
-    step = next((_number(known[name]) for name in STEPS if name in known), None)
-    rate = next((_number(known[name]) for name in RATES if name in known), None)
+    step, rate = (_number(next((known[name] for name in of if name in known), None)) for of in (STEPS, RATES))
     step = step or (1 / rate if rate else None)
     if step is None or not 0 < step < np.inf:
         return None
-    start = next((moment for name in STARTS if name in known and (moment := _moment(known[name])) is not None), None)
+    start = next(filter(None, (_moment(known.get(name)) for name in STARTS)), None)
     offset = _number(known.get("wf_start_offset")) or 0.0
     return Clock(
         f"{step!r} s from {start} + {offset!r}",

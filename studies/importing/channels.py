@@ -136,7 +136,7 @@ class ChannelTable(RawTable):
 
 def read_channel_tables(paths: Sequence[str | Path], file: FileMap) -> Generator[RawTable]:
     """Yield the rows of the channels of one [[file]] of a map, a portion at a time."""
-    wanted = [*file.time, *(column.source for column in file.columns)]
+    wanted = file.sources
     for path in paths:
         with contextlib.ExitStack() as files:
             channels = read_channels(path, files)

@@ -11,7 +11,7 @@ from compensation.arrays import Array
 from studies.errors import InputError, numbered
 from studies.files.given import shorten
 from studies.files.stored import PORTION, Stored, portions
-from studies.importing.daylight import find_change
+from studies.importing.daylight import ahead_of_utc, find_change
 from studies.importing.mapping import DURATIONS, EPOCHS, LOCAL, OWN, FileMap
 from studies.importing.tables import RawTable
 from studies.importing.units import SECONDS
@@ -91,7 +91,7 @@ class Clock:
             zone = None
         local = self.origin is not None and self.origin.tzinfo is None and file.sample_period is None
         if self.origin is not None and local and not zone and not file.counts_from_zero:
-            changes = (find_change(self.origin, seconds[max(k.start - 1, 0) : k.stop]) for k in portions(len(seconds)))
+            changes = (find_change(self.origin, seconds[k]) for k in portions(len(seconds), 1))
             self.notes += [f"CHECK: {change[1]}" for change in changes if change]
         rate = file.clock_rate_ppm * 1e-6 if file.sample_period is None else 0.0
         if not (zone or rate or file.clock_offset):
@@ -251,15 +251,7 @@ def _with_offset(origin: datetime.datetime, ahead: datetime.timedelta | None) ->
 
 def _utc_offsets(origin: datetime.datetime, seconds: Array, zone: str) -> tuple[Array, int]:
     """Return by how many seconds the zone's clocks are ahead of UTC at each local time; NaN where the time does not exist."""
-    import pandas as pd
-
-    wall = pd.DatetimeIndex(np.datetime64(origin, "us") + np.round(1e6 * seconds).astype("timedelta64[us]"))
-
-    def ahead(summer: bool) -> Array:
-        placed = wall.tz_localize(zone, ambiguous=np.full(len(wall), summer), nonexistent="NaT")
-        return np.asarray((wall - placed.tz_convert(None)) / pd.Timedelta(seconds=1), dtype=float)
-
-    first, second = ahead(summer=True), ahead(summer=False)
+    first, second = (ahead_of_utc(origin, seconds, zone, summer=one) for one in (True, False))
     twice = np.flatnonzero(first > second)
     for block in np.split(twice, np.flatnonzero(np.diff(twice) > 1) + 1) if len(twice) else []:
         start = _second_pass(seconds, int(block[0]), int(block[-1]))

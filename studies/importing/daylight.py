@@ -1,7 +1,6 @@
 """Local times that leap by an hour where clocks go to summer or winter time: a gap, or rows twice, that are none."""
 
 import datetime
-import zoneinfo
 
 import numpy as np
 
@@ -28,7 +27,7 @@ def find_change(origin: datetime.datetime, seconds: Array) -> tuple[str, str] | 
         for k in np.flatnonzero((abs(steps - usual - more) <= near) & (abs(steps - usual) > usual / 2)).tolist():
             one, two = (origin + datetime.timedelta(seconds=float(t)) for t in seconds[k : k + 2])
             for name in ZONES:
-                if _ahead(two, name, 1) - _ahead(one, name, 0) == more:
+                if _change(origin, seconds[k : k + 2], name) == more:
                     leap, pause = ("more", ", unless the logger paused") if more > 0 else ("less", "")
                     return name, (
                         f"after {one:%Y-%m-%d %H:%M:%S} comes {two:%H:%M:%S}, an hour {leap} than between other rows: clocks change then,"
@@ -37,12 +36,19 @@ def find_change(origin: datetime.datetime, seconds: Array) -> tuple[str, str] | 
     return None
 
 
-def _ahead(local: datetime.datetime, name: str, fold: int) -> float:
-    """Return by how many seconds a zone is ahead of UTC at a local time; NaN where the time does not exist, or the zone is not known."""
+def _change(origin: datetime.datetime, seconds: Array, zone: str) -> float:
+    """Return by how much a zone is further ahead of UTC at the second of two local times; NaN where the machine does not know it."""
     try:
-        at = local.replace(tzinfo=zoneinfo.ZoneInfo(name), fold=fold)
-    except (zoneinfo.ZoneInfoNotFoundError, OSError):
+        before, after = (ahead_of_utc(origin, seconds[[k]], zone, summer=k == 0) for k in (0, 1))
+    except (KeyError, OSError):
         return np.nan
-    exists = at.astimezone(datetime.UTC).astimezone(at.tzinfo).replace(tzinfo=None) == local
-    ahead = at.utcoffset()
-    return ahead.total_seconds() if exists and ahead is not None else np.nan
+    return float(after[0] - before[0])
+
+
+def ahead_of_utc(origin: datetime.datetime, seconds: Array, zone: str, *, summer: bool) -> Array:
+    """Return by how many seconds a zone is ahead of UTC at local times after an origin, the earlier (`summer`) or later of an hour that comes twice; NaN where the time does not exist."""
+    import pandas as pd
+
+    wall = pd.DatetimeIndex(np.datetime64(origin, "us") + np.round(1e6 * seconds).astype("timedelta64[us]"))
+    placed = wall.tz_localize(zone, ambiguous=np.full(len(wall), summer), nonexistent="NaT")
+    return np.asarray((wall - placed.tz_convert(None)) / pd.Timedelta(seconds=1), dtype=float)

@@ -109,20 +109,17 @@ def _report_gaps(one: ClockedFile) -> list[str]:
     """Say where the sampling of a file has gaps."""
     if len(one.time) < 2:
         return []
-    longest, total, count, limit, most, last = 0.0, 0.0, 0, one.longest_gap, 0.0, np.nan
-    for k in portions(len(one.time)):
-        t = np.append(last, one.time[k])
-        steps = np.diff(t)
-        gaps, last = np.flatnonzero(steps > limit), t[-1]
-        count, total = count + gaps.size, total + float(steps[gaps].sum())
-        if gaps.size and (at := gaps[np.argmax(steps[gaps])], steps[at])[1] > most:
-            longest, most = float(t[at]), float(steps[at])
+    limit, gaps = one.longest_gap, np.empty((0, 2))  # when they begin, and how long they last
+    for k in portions(len(one.time), 1):
+        t = one.time[k]
+        gaps = np.append(gaps, np.column_stack([t[:-1], np.diff(t)])[np.diff(t) > limit], axis=0)
     usual = f"{len(one.time)} rows, usually {one.usual_step:.6g} s apart"
-    if not count:
+    if not len(gaps):
         return [f"{usual}; no gap longer than {limit:.6g} s"]
+    after, most = gaps[np.argmax(gaps[:, 1])]
     return [
-        f"{usual}; {numbered(count, 'gap')} longer than {limit:.6g} s, {total:.6g} s together, the"
-        f" longest of {most:.6g} s after {longest - one.span[0]:.6g} s"
+        f"{usual}; {numbered(len(gaps), 'gap')} longer than {limit:.6g} s, {gaps[:, 1].sum():.6g} s together, the"
+        f" longest of {most:.6g} s after {after - one.span[0]:.6g} s"
     ]
 
 

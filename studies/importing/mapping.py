@@ -70,7 +70,7 @@ class ColumnMap(Keys, frozen=True, kw_only=True):
         known = (*TARGETS, "temperature_degC")
         if self.target not in known:
             raise ValueError(f"to = '{self.target}' is not a column of a record{nearest(self.target, TARGETS)}")
-        if find_spelling(self.target, split_nominal(self.stated_unit)[0]) is None:
+        if not self.unit:
             raise ValueError(
                 f"unit = '{self.stated_unit}' is unknown{nearest(self.stated_unit, units_of(self.target))}"
             )
@@ -89,8 +89,8 @@ class ColumnMap(Keys, frozen=True, kw_only=True):
 
     @property
     def unit(self) -> str:
-        """The unit as the table of units spells it."""
-        return str(find_spelling(self.target, split_nominal(self.stated_unit)[0]))
+        """The unit as the table of units spells it; "" where it has none such."""
+        return find_spelling(self.target, split_nominal(self.stated_unit)[0]) or ""
 
     @property
     def conversion(self) -> Unit:
@@ -196,6 +196,11 @@ class FileMap(Keys, frozen=True, kw_only=True):
     def time(self) -> tuple[str, ...]:
         """The columns that make the time."""
         return (self.time_columns,) if isinstance(self.time_columns, str) else self.time_columns
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """All columns of the raw file that are read."""
+        return (*self.time, *(column.source for column in self.columns))
 
     @property
     def added(self) -> str:

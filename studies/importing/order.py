@@ -14,13 +14,8 @@ from studies.importing.tables import Rows
 
 def rises(time: Stored) -> bool:
     """Whether every row has a time after the one before it."""
-    last = -np.inf
-    for k in portions(len(time)):
-        t = np.append(last, time[k])
-        if not np.all(t[1:] > t[:-1]):
-            return False
-        last = t[-1]
-    return True
+    known = bool(np.isfinite(time[:1]).all())
+    return known and all((np.diff(time[k]) > 0).all() for k in portions(len(time), 1))
 
 
 class Order:

@@ -18,14 +18,14 @@ import msgspec
 import numpy as np
 
 from compensation.arrays import Array
-from studies.errors import InputError, numbered
+from studies.errors import InputError, nearest, numbered
 from studies.files.given import shorten
 from studies.files.numbers import ROWS_AT_ONCE, parse_portions
 from studies.files.reading import ANY_SIZE, PORTION, digest, opened
 from studies.importing.mapping import SEPARATORS, FileMap
 from studies.importing.notation import pattern_of, read_number
 from studies.importing.sheets import EXCEL, read_sheets
-from studies.importing.tables import ParsedTable, Part, RawTable, check_column
+from studies.importing.tables import ParsedTable, Part, RawTable
 from studies.importing.units import find_spelling
 
 if TYPE_CHECKING:
@@ -58,7 +58,6 @@ class TextTable(RawTable):
 
     def text(self, column: str) -> "pd.Series[str]":
         """Return the cells of one column without the blanks around them."""
-        check_column(self.path, column, [str(name) for name in self.cells if name != OVERFLOW])
         return self.cells[column].str.strip()
 
     def read(self, column: str) -> Array:
@@ -99,6 +98,9 @@ def read_text(paths: Sequence[str | Path], file: FileMap, plain: bool = True) ->
         for own, table in read_plain(path, file) if plain else read_raw(path, file):
             if names and own != names:
                 raise InputError(f"{path}: has other columns than {paths[0]}; give it its own [[file]] table.")
+            for name in file.sources if not names else ():
+                if name not in own:
+                    raise InputError(f"{path}: there is no column '{name}'{nearest(name, own)}")
             names = own
             yield table
 
@@ -302,7 +304,7 @@ def _parse_text(path: str | Path, body: _Body, file: FileMap, names: list[str]) 
                         raise _no_rows(path, file)
                     remark = cells[names[0]].str.startswith("#")
                     if file.sample_period is None and remark.any():  # it becomes a row without a time
-                        if names[0] not in {*file.time, *(column.source for column in file.columns)}:
+                        if names[0] not in file.sources:
                             remark &= (cells.iloc[:, 1:] == "").all(axis=1)
                         cells[remark] = ""
                     longer = cells.index[cells[OVERFLOW].str.strip() != ""]

@@ -1,14 +1,14 @@
 """What every stretch of a raw table is, of text or of channels: columns by name, and where their rows stand."""
 
 import contextlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from compensation.arrays import Array
-from studies.errors import InputError, nearest
+from studies.errors import InputError
 
 if TYPE_CHECKING:
     import datetime
@@ -88,7 +88,6 @@ class ParsedTable(RawTable):
 
     def read(self, column: str) -> Array:
         """Return the values of a column."""
-        check_column(self.path, column, self.columns)
         return self.columns[column].copy()
 
 
@@ -111,9 +110,3 @@ class Rows:
         """Return the file and the line on which a row stands."""
         k = int(np.searchsorted(self.begins, row, side="right")) - 1
         return self.parts[k].place(row - self.begins[k])
-
-
-def check_column(path: str, column: str, columns: Iterable[str]) -> None:
-    """Refuse the name of a column that a table lacks."""
-    if column not in columns:
-        raise InputError(f"{path}: there is no column '{column}'{nearest(column, list(columns))}")
