@@ -34,14 +34,19 @@ class StudyParameter:
         return unit_of(self.name)
 
     @property
+    def normal(self) -> Any:
+        """What a normal one is drawn from (scipy), cut off at its ends where it has any."""
+        from scipy.stats import norm, truncnorm
+
+        middle, stated = float(self.nominal), self.standard_deviation or 0.0
+        if not self.bounded:
+            return norm(middle, stated)
+        return truncnorm((self.low - middle) / stated, (self.high - middle) / stated, middle, stated)
+
+    @property
     def drawn_deviation(self) -> float:
         """Standard deviation of what is drawn of a normal one: less than the stated where its ends cut it off."""
-        from scipy.stats import truncnorm
-
-        stated, middle = self.standard_deviation or 0.0, float(self.nominal)
-        if not self.bounded:
-            return stated
-        return float(truncnorm.std((self.low - middle) / stated, (self.high - middle) / stated, scale=stated))
+        return float(self.normal.std())
 
 
 @dataclass(frozen=True)

@@ -126,20 +126,16 @@ def _scale(study: Study, unit: Array) -> Array:
 
 
 def _quantile(parameter: StudyParameter, p: Array) -> Array:
-    from scipy import stats
-
-    low, high, middle = parameter.low, parameter.high, float(parameter.nominal)
+    low, high = parameter.low, parameter.high
     if parameter.distribution == "uniform":
         return low + p * (high - low)
     if parameter.distribution == "log-uniform":
         return np.asarray(np.exp(np.log(low) + p * np.log(high / low)))
     if parameter.distribution == "triangular":
-        return np.asarray(stats.triang.ppf(p, (middle - low) / (high - low), low, high - low))
-    deviation = float(parameter.standard_deviation or 0.0)
-    if parameter.bounded:
-        ends = (low - middle) / deviation, (high - middle) / deviation
-        return np.asarray(stats.truncnorm.ppf(p, *ends, middle, deviation))
-    return np.asarray(stats.norm.ppf(p, middle, deviation))
+        from scipy.stats import triang
+
+        return np.asarray(triang.ppf(p, (float(parameter.nominal) - low) / (high - low), low, high - low))
+    return np.asarray(parameter.normal.ppf(p))
 
 
 SAMPLERS = {

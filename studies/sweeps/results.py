@@ -65,16 +65,16 @@ class Results(Shown):
 
     def column(self, name: str) -> Array:
         """Return one column of results."""
-        return self._column(1 + len(self.study.names) + self._place(name))
+        return self._column(self._places[name])
 
     def error(self, name: str) -> Array:
         """Return the estimates of the numerical error of one column."""
-        return self._column(1 + len(self.study.names) + len(self.study.columns) + self._place(name))
+        return self._column(self._places[name] + len(self.study.columns))
 
     def parameter(self, name: str) -> NDArray[Any]:
         """Return one parameter of every case."""
-        place = self.study.names.index(name)
-        return decode([coding(self.study)[place]], self._column(1 + place)[:, None])[name]
+        place = self._places[name]
+        return decode([coding(self.study)[place - 1]], self._column(place)[:, None])[name]
 
     def design(self, place: int) -> dict[str, Any]:
         """Return the parameters of one case by name."""
@@ -124,10 +124,9 @@ class Results(Shown):
         for _, found in self.store.read(places):
             yield found
 
-    def pieces(self, parameters: Sequence[str], columns: Sequence[str]) -> Iterator[Array]:
+    def pieces(self, names: Sequence[str]) -> Iterator[Array]:
         """Give numeric parameters and columns by name (names, m), some thousand cases at a time."""
-        d, names = len(self.study.names), self.study.names
-        return self.blocks([*(1 + names.index(p) for p in parameters), *(1 + d + self._place(c) for c in columns)])
+        return self.blocks([self._places[name] for name in names])
 
     def frames(self) -> "Iterator[pd.DataFrame]":
         """Give one row a case, some thousand at a time: parameters, results, numerical errors, status, remark."""
@@ -183,8 +182,10 @@ class Results(Shown):
         """Close the store."""
         self.store.close()
 
-    def _place(self, name: str) -> int:
-        return [column.name for column in self.study.columns].index(name)
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        """Columns of the store by name: behind the places of the cases parameters, then results; their errors come last."""
+        return {name: k for k, name in enumerate([*self.study.names, *(c.name for c in self.study.columns)], 1)}
 
     def _column(self, k: int) -> Array:
         """One column of the store; those that were read last are kept, as many as memory is meant for."""

@@ -145,7 +145,7 @@ def linear_shares(results: Results, column: str) -> LinearShares | None:
 
 def _numbers(results: Results, numeric: Sequence[str], column: str) -> Iterator[Array]:
     """Give the numeric parameters and a column of the designs that have it, some thousand at a time."""
-    for z in results.pieces(numeric, [column]):
+    for z in results.pieces([*numeric, column]):
         kept = z[:, np.isfinite(z[-1])]
         if kept.size:
             yield kept

@@ -59,7 +59,7 @@ def find_yield(results: Results, requirements: tuple[Requirement, ...]) -> Yield
     # rows that are independent draws: of Saltelli's design the first two blocks
     last = 2 * results.study.sampling.cases if results.study.sampling.method == "sensitivity" else len(results)
     n = passed = unknown = 0
-    for found in results.pieces([], [requirement.column for requirement in requirements]):
+    for found in results.pieces([requirement.column for requirement in requirements]):
         values = found[:, : last - n].T
         inside = (values >= low) & (values <= high)
         good, fails = inside.all(axis=1), (np.isfinite(values) & ~inside).any(axis=1)

@@ -57,12 +57,8 @@ def _problem(study: Study, values: Mapping[str, Any]) -> str:
 
 def _corners(study: Study) -> Iterator[Mapping[str, Any]]:
     geometry = [p for p in study.parameters if p.name.startswith("resonator.") and not isinstance(p.nominal, str)]
-    if len(geometry) > MOST_CORNERS:
-        yield from ({p.name: value} for p in geometry for value in (p.low, p.high))
-        return
-    names = [p.name for p in geometry]
-    for ends in product(*((p.low, p.high) for p in geometry)):
-        yield dict(zip(names, ends, strict=True))
+    for ends in product(*((p.low, p.high) for p in geometry)) if len(geometry) <= MOST_CORNERS else ():
+        yield {p.name: end for p, end in zip(geometry, ends, strict=True)}
 
 
 def check_sample(study: Study, where: str) -> None:
