@@ -13,7 +13,7 @@ from studies.schema.keys import Keys, number, says
 from studies.schema.reader import read_file
 
 SCHEMA = "hrg.map/1"
-SEPARATORS = {";": ";", ",": ",", "tab": "\t", "|": "|", "space": r"\s+"}
+SEPARATORS = {";": ";", ",": ",", "tab": "\t", "|": "|", "space": " "}
 EPOCHS: Mapping[str, tuple[float, float, str]] = {
     **{f"unix-{name}": (SECONDS[name], 0.0, "unix|posix|epoch") for name in ("s", "ms", "us", "ns")},
     "excel-days": (86400.0, 25569.0, "excel|serial"),

@@ -6,13 +6,11 @@ import csv
 import gzip
 import io
 import itertools
-import re
-import warnings
 import zlib
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 import msgspec
 import numpy as np
@@ -20,7 +18,7 @@ import numpy as np
 from compensation.arrays import Array
 from studies.errors import InputError, nearest, numbered
 from studies.files.given import shorten
-from studies.files.numbers import ROWS_AT_ONCE, parse_portions
+from studies.files.numbers import parse_portions
 from studies.files.reading import ANY_SIZE, PORTION, digest, opened
 from studies.importing.mapping import SEPARATORS, FileMap
 from studies.importing.notation import pattern_of, read_number
@@ -31,8 +29,8 @@ from studies.importing.units import find_spelling
 if TYPE_CHECKING:
     import pandas as pd
 
-OVERFLOW = "(beyond the header)"
 PACKED = ".gz"
+CELLS_AT_ONCE = 400_000  # of text
 
 
 class NotPlain(Exception):
@@ -115,7 +113,7 @@ def read_plain(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], Raw
     if b"".join(head).startswith(codecs.BOM_UTF8):
         raise NotPlain
     try:
-        names = _head(path, _split_lines(path, b"".join(head).decode(), file), file)
+        names = _head(path, _split_head(path, [line.decode() for line in head], file), file)
         begin, done, part = sum(map(len, head[: file.data_line - 1])), 0, None
         for _, sha256, table in parse_portions(path, begin, names, SEPARATORS[file.separator], file.decimal, ANY_SIZE):
             part = part or Part(str(path), sha256, file.data_line)
@@ -128,37 +126,56 @@ def read_plain(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], Raw
 
 def read_raw(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTable]]:
     """Yield the columns' names and the next rows of one raw file, as its map describes it, with cells of text."""
-    import pandas as pd
-
     part = Part(str(path), digest(path, ANY_SIZE), file.data_line)
     if Path(path).suffix.lower() in EXCEL:
-        _, lines = next(read_sheets(path, file.sheet))
-        names, rows = _head(path, lines, file), lines[file.data_line - 1 : file.last_line]
-        if not rows:
-            raise _no_rows(path, file)
-        width = len(names) + 1
-        if any(any(row[width - 1 :]) for row in rows):
-            raise InputError(f"{path}: some rows of the sheet are longer than its header (line {file.header_line}).")
-        filled = [(row + [""] * width)[:width] for row in rows]
-        cells = pd.DataFrame(filled, columns=[*names, OVERFLOW], dtype=str)
-        yield names, TextTable(part, file.missing, 0, len(cells), cells, msgspec.structs.replace(file, decimal="."))
+        _, sheet = next(read_sheets(path, file.sheet))
+        yield from _read_rows(part, sheet, sheet[file.data_line - 1 :], msgspec.structs.replace(file, decimal="."))
         return
     with unpacked(path) as raw:
         if not raw.read(PORTION).strip():
             raise InputError(f"{path}: the file is empty.")
         raw.seek(0)
         text = io.TextIOWrapper(raw, "utf-8-sig" if file.encoding == "utf-8" else file.encoding)
+        lines = (_checked(path, line) for line in text)
         try:
-            body = _Body(path, text, list(itertools.islice(text, file.data_line)), file)
-            lines = _split_lines(path, body.head, file)
-            names = _head(path, lines, file)
-            # a spreadsheet writes separators of empty columns behind the last one
-            if file.header_line and file.separator != "space" and not lines[-1][-1].strip():
-                body.padding = re.compile(f"{re.escape(SEPARATORS[file.separator])}+$", re.MULTILINE)
-            for cells in _parse_text(path, body, file, names):
-                yield names, TextTable(part, file.missing, int(cells.index[0]), len(cells), cells, file)
+            head = list(itertools.islice(lines, file.data_line))
+            rows = split_lines(itertools.chain(head[file.data_line - 1 :], lines), file.separator, strict=True)
+            yield from _read_rows(part, _split_head(path, head, file), rows, file)
         except UnicodeError:
             raise _wrong_encoding(path, file.encoding) from None
+        except csv.Error as error:
+            line = file.data_line - 1 + rows.line_num
+            raise InputError(f"{path}, line {line}: cannot be split ({error}); correct its quotes, or the separator in the map.") from None  # fmt: skip
+
+
+def _read_rows(
+    part: Part, head: Sequence[Sequence[str]], rows: Iterable[list[str]], file: FileMap
+) -> Iterator[tuple[list[str], RawTable]]:
+    """Yield the columns' names of a head, and the rows below it a portion at a time; a remark becomes an empty row, without a time."""
+    import pandas as pd
+
+    path, names, at = part.path, _head(part.path, head, file), 0
+    width, untimed = len(names), file.sample_period is not None
+    rows = itertools.islice(rows, None if file.last_line is None else file.last_line - file.data_line + 1)
+    while block := list(itertools.islice(rows, max(CELLS_AT_ONCE // width, 1))):
+        for k, row in enumerate(block):
+            if len(row) == width and row[0][:1] != "#":
+                continue
+            if row and row[0][:1] == "#" and not untimed and (names[0] in file.sources or not any(row[1:])):
+                row = []
+            if any(map(str.strip, row[width:])):
+                raise InputError(
+                    f"{path}, {part.row_name} {file.data_line + at + k}: more values than the {width} columns of the header; check separator,"
+                    " header_line and decimal in the map."
+                )
+            block[k] = (row + [""] * width)[:width]
+        if not at and not any(map(any, block)):
+            break
+        cells = pd.DataFrame(block, columns=names, dtype=str)
+        yield names, TextTable(part, file.missing, at, len(block), cells, file)
+        at += len(block)
+    if not at:
+        raise _no_rows(path, file)
 
 
 @contextlib.contextmanager
@@ -217,18 +234,23 @@ def decode(path: str | Path, data: bytes, encoding: str) -> str:
     return _checked(path, text).replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _split_lines(path: str | Path, text: str, file: FileMap) -> list[list[str]]:
+def _split_head(path: str | Path, lines: Sequence[str], file: FileMap) -> list[list[str]]:
     """Return the cells of the lines down to the header; of the first line of data where there is none."""
-    count = file.header_line or file.data_line
     try:
-        return [split_line(line, file.separator) for line in text.split("\n", count)[:count]]
+        return [split_line(line, file.separator) for line in lines[: file.header_line or file.data_line]]
     except csv.Error as error:
         raise InputError(f"{path}, line {file.header_line}: the header cannot be read ({error}).") from None
 
 
 def split_line(line: str, separator: str) -> list[str]:
     """Return the cells of a line, by the name of a separator."""
-    return line.split() if separator == "space" else next(csv.reader([line], delimiter=SEPARATORS[separator]), [])
+    return next(split_lines([line], separator), [])
+
+
+def split_lines(lines: Iterable[str], separator: str, strict: bool = False) -> Any:
+    """Return the reader of the cells in lines; one in quotes may go on in the next line, and ends somewhere if `strict`."""
+    single = (" ".join(line.split()) for line in lines) if separator == "space" else lines
+    return csv.reader(single, delimiter=SEPARATORS[separator], strict=strict)
 
 
 def _head(path: str | Path, lines: Sequence[Sequence[str]], file: FileMap) -> list[str]:
@@ -254,70 +276,5 @@ def name_columns(cells: Sequence[str]) -> list[str]:
     names: list[str] = []
     for place, cell in enumerate(cells, 1):
         wanted = " ".join(cell.split()) or f"column {place}"
-        names.append(f"{wanted} #{place}" if wanted in [*names, OVERFLOW] else wanted)
+        names.append(f"{wanted} #{place}" if wanted in names else wanted)
     return names
-
-
-class _Body:
-    """The rows of a text as a file that gives some whole lines at a time."""
-
-    padding: re.Pattern[str] | None = None
-
-    def __init__(self, path: str | Path, text: io.TextIOWrapper, head: list[str], file: FileMap) -> None:
-        self.path, self.text = path, text
-        self.head, self.first = _checked(path, "".join(head)), "".join(head[file.data_line - 1 :])
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.read, "")
-
-    def read(self, _: int = -1) -> str:
-        """The next lines, as many as there are at hand."""
-        part, self.first = self.first or self.text.read(PORTION), ""
-        part += self.text.readline() if part and not part.endswith("\n") else ""
-        part = _checked(self.path, part)
-        return self.padding.sub("", part) if self.padding else part
-
-
-def _parse_text(path: str | Path, body: _Body, file: FileMap, names: list[str]) -> "Iterator[pd.DataFrame]":
-    """Yield the cells of the next rows."""
-    import pandas as pd
-
-    rows = None if file.last_line is None else file.last_line - file.data_line + 1
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", pd.errors.ParserWarning)
-            with pd.read_csv(
-                body,  # type: ignore[call-overload]
-                sep=SEPARATORS[file.separator],
-                header=None,
-                names=[*names, OVERFLOW],
-                dtype=str,
-                na_filter=False,
-                skip_blank_lines=False,
-                index_col=False,
-                nrows=rows,
-                chunksize=ROWS_AT_ONCE,
-            ) as parts:
-                for cells in parts:
-                    cells = cells.fillna("")
-                    if not len(cells) or (cells.index[-1] < ROWS_AT_ONCE - 1 and not cells.to_numpy().any()):
-                        raise _no_rows(path, file)
-                    remark = cells[names[0]].str.startswith("#")
-                    if file.sample_period is None and remark.any():  # it becomes a row without a time
-                        if names[0] not in file.sources:
-                            remark &= (cells.iloc[:, 1:] == "").all(axis=1)
-                        cells[remark] = ""
-                    longer = cells.index[cells[OVERFLOW].str.strip() != ""]
-                    if len(longer):
-                        line = file.data_line + int(longer[0])
-                        raise InputError(
-                            f"{path}, line {line}: more values than the {len(names)} columns of the header; check separator and decimal in the map."
-                        )
-                    yield cells
-    except pd.errors.EmptyDataError:
-        raise _no_rows(path, file) from None
-    except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
-        raise InputError(
-            f"{path}: the rows from line {file.data_line} on do not fit the {len(names)} columns of the header"
-            f" ({shorten(str(error))}); check separator and decimal in the map."
-        ) from None

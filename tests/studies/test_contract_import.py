@@ -950,7 +950,7 @@ def test_portions_change_nothing(tmp_path, monkeypatch):
         with monkeypatch.context() as patch:
             for module in (clock, stored, numbers):
                 patch.setattr(module, "ROWS_AT_ONCE" if module is numbers else "PORTION", 7)
-            patch.setattr(raw, "ROWS_AT_ONCE", 7)
+            patch.setattr(raw, "CELLS_AT_ONCE", 21)
             patch.setattr(numbers, "FEW", 4)
             found.append((whole, import_records(paths, loaded)[""]))
     for whole, parts in found:
@@ -1286,6 +1286,30 @@ def test_impossible_readings_are_dropped_where_the_map_says_so(tmp_path):
     record = draft_and_import(raw, tmp_path, ('unit = "degC"', 'unit = "degC"\ndrop = ["impossible"]'))
     assert np.flatnonzero(np.isnan(record["housing_temperature_degC"])).tolist() == [4, 5]
     assert any("2 readings of 'T_case (°C)' are impossible: left empty" in note for note in record.comments)
+
+
+def test_a_remark_between_rows_of_a_workbook_is_left_out_as_in_a_text(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl", reason="the optional extra 'excel' is not installed")
+    rows = [["time_s", "frequency [Hz]", "T [°C]"], *([10 * k, 4400 + k / 8, 20.5 + k] for k in range(20))]
+    rows.insert(9, ["# door opened", None, None])
+    book = openpyxl.Workbook()
+    for row in rows:
+        book.active.append(row)
+    book.save(tmp_path / "raw.xlsx")
+    (tmp_path / "raw.csv").write_text("\n".join(",".join("" if x is None else str(x) for x in row) for row in rows))
+    for name in ("raw.xlsx", "raw.csv"):
+        record = draft_and_import(tmp_path / name, tmp_path)
+        assert record["time_s"].tolist() == [10.0 * k for k in range(20)]
+        assert any(
+            f"1 row without a time left out (first: {tmp_path / name}, line 10)" in one for one in record.comments
+        )
+
+
+def test_a_quote_that_does_not_end_hides_no_rows(tmp_path):
+    raw = tmp_path / "raw.csv"
+    raw.write_text("time [s],T [°C],note\n" + "".join(f"{k},{20 + k / 8},{chr(34) * (k == 9)}ok\n" for k in range(20)))
+    with pytest.raises(InputError, match=r"line 21: cannot be split .*; correct its quotes"):
+        draft_and_import(raw, tmp_path)
 
 
 def test_a_workbook_with_a_date_and_a_time_of_day_in_two_columns(tmp_path):
