@@ -162,7 +162,7 @@ def _draft_table(path: str) -> tuple[list[str], tuple[str, ...]] | None:
     look = look_at(path)
     if look.header is None:
         return None
-    hints, numbers, body, above = look.hints, look.numbers, look.body, _lines_above(look)
+    hints, numbers, body, above = look.hints, look.numbers, look.body, look.above
     meanings = find_meanings(hints, numbers)
     clocks = (name for name in hints if rises(numbers[name]) and name not in meanings)
     if any(read_heading("time_s", hints[name]).unit for name in clocks) or any(map(is_time, hints, hints.values())):
@@ -207,12 +207,8 @@ def _describe_notation(path: str, look: Look) -> list[str]:
     return [*lines, f"header_line = {header}", f"data_line = {look.data + 1}", *end]
 
 
-def _lines_above(look: Look) -> list[str]:
-    return [" ".join(row) for row in look.rows[: look.data if look.header is None else look.header]]
-
-
 def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
-    names, above, cells, hints, numbers = look.names, _lines_above(look), look.columns, look.hints, look.numbers
+    names, above, cells, hints, numbers = look.names, look.above, look.columns, look.hints, look.numbers
     period = find_period([*above, *names])
     own = look.group.clock if look.group is not None else None
     time, form, unsure = ([], "", "") if own is not None else find_time(look, evenly=period is not None)

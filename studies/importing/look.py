@@ -1,5 +1,7 @@
 """A first look at a raw file: its encoding, separator, decimal sign, and where the table begins; or the channels of a group."""
 
+import codecs
+import contextlib
 import csv
 import re
 from collections import Counter
@@ -14,7 +16,7 @@ from studies.importing.channels import Group, is_container, open_channels, sort_
 from studies.importing.heading import spell
 from studies.importing.meaning import looks_likely
 from studies.importing.notation import Notation, find_notation, is_number, unit_of
-from studies.importing.raw import decode, name_columns, read_filled, split_line
+from studies.importing.raw import check_text, name_columns, split_line, unpacked
 from studies.importing.sheets import EXCEL, read_sheets
 from studies.importing.units import is_unit, units_of
 from studies.importing.words import ENGLISH
@@ -56,6 +58,11 @@ class Look:
     def body(self) -> list[list[str]]:
         """The rows of the table that hold something, but a remark alone."""
         return [row for row in self.rows[self.data :] if any(map(str.strip, row)) and not _is_remark(row)]
+
+    @property
+    def above(self) -> list[str]:
+        """The lines above the table."""
+        return [" ".join(row) for row in self.rows[: self.data if self.header is None else self.header]]
 
     @property
     def remarks(self) -> list[str]:
@@ -100,9 +107,10 @@ def look_at(path: str) -> Look:
             return replace(cast(Look, looks[most]), sheet=most, others=tuple(name for name in looks if name != most))
         where, mend = f" on any of its sheets {', '.join(looks)}", 'write the map by hand, with sheet = "…"'
     else:
-        data = read_filled(path, HEAD)
-        encoding = _find_encoding(path, data)
-        lines = decode(path, data, encoding).split("\n")
+        with unpacked(path) as raw:
+            data = raw.read(HEAD)
+        encoding, text = _decode(path, data)
+        lines = text.split("\n")
         separator = _find_separator(lines[:SEEN])
         rows, end = ([_split(line, separator) for line in part] for part in (lines[:SEEN], lines[-FOOT:]))
         if found := _find_table(rows, end, len(lines) if len(data) < HEAD else 0):
@@ -166,22 +174,24 @@ def _is_unit_line(row: Sequence[str]) -> bool:
     return bool(cells) and all(re.fullmatch(r"[\[(].*[\])]|-|1", cell) or is_unit(cell) for cell in cells)
 
 
-def _find_encoding(path: str, data: bytes) -> str:
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return "utf-16"
+def _decode(path: str, data: bytes) -> tuple[str, str]:
+    """Return the code page of a text, of those that can be the one by which its head has most words that are known, and the text in whole lines."""
+
+    def read(page: str) -> str:
+        decoder = codecs.getincrementaldecoder("utf-8-sig" if page == "utf-8" else page)()
+        return decoder.decode(data, final=len(data) < HEAD)
+
     known: dict[str, int] = {}
-    for encoding in ("utf-8", *PAGES):
-        try:
-            text = decode(path, data, encoding)[:HEADING].lower()
-        except InputError:
-            continue
-        if encoding == "utf-8":
-            return encoding
-        known[encoding] = sum(
-            not word.isascii() for pattern in WORDS for word in (one[0] for one in re.finditer(pattern, text))
-        )
-    best = max(known, key=lambda one: known[one], default="latin-1")
-    return best if known.get(best) or best == "cp1252" else "latin-1"
+    for page in ("utf-16",) if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else ("utf-8", *PAGES):
+        with contextlib.suppress(UnicodeError):
+            words = (one[0] for pattern in WORDS for one in re.finditer(pattern, read(page)[:HEADING].lower()))
+            known[page] = sum(not word.isascii() for word in words)
+            if page.startswith("utf"):
+                break
+    best = max(known, key=lambda page: known[page], default="latin-1")
+    best = best if known.get(best) or best in ("utf-8", "utf-16", "cp1252") else "latin-1"
+    text = check_text(path, read(best)).replace("\r\n", "\n").replace("\r", "\n")
+    return best, text if len(data) < HEAD else text[: text.rfind("\n") + 1]
 
 
 def _find_separator(lines: Sequence[str]) -> str:

@@ -132,11 +132,8 @@ def read_raw(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTa
         yield from _read_rows(part, sheet, sheet[file.data_line - 1 :], msgspec.structs.replace(file, decimal="."))
         return
     with unpacked(path) as raw:
-        if not raw.read(PORTION).strip():
-            raise InputError(f"{path}: the file is empty.")
-        raw.seek(0)
         text = io.TextIOWrapper(raw, "utf-8-sig" if file.encoding == "utf-8" else file.encoding)
-        lines = (_checked(path, line) for line in text)
+        lines = (check_text(path, line) for line in text)
         try:
             head = list(itertools.islice(lines, file.data_line))
             rows = split_lines(itertools.chain(head[file.data_line - 1 :], lines), file.separator, strict=True)
@@ -180,13 +177,14 @@ def _read_rows(
 
 @contextlib.contextmanager
 def unpacked(path: str | Path) -> Iterator[BinaryIO]:
-    """Open a raw file for reading, through gzip where its name ends so."""
+    """Open a raw file that holds something for reading, through gzip where its name ends so."""
     with opened(path, ANY_SIZE) as raw:
-        if Path(path).suffix.lower() != PACKED:
-            yield raw
-            return
+        file = cast(BinaryIO, gzip.GzipFile(fileobj=raw) if Path(path).suffix.lower() == PACKED else raw)
         try:
-            yield cast(BinaryIO, gzip.GzipFile(fileobj=raw))
+            if not file.read(PORTION).strip():
+                raise InputError(f"{path}: the file is empty.")
+            file.seek(0)
+            yield file
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
             raise InputError(f"{path}: cannot be unpacked by gzip ({shorten(str(error))}); pack it again.") from None
 
@@ -208,30 +206,13 @@ def _wrong_encoding(path: str | Path, encoding: str) -> InputError:
     return InputError(f"{path}: not {encoding} text; set 'encoding' in the map (cp1252 is common).")
 
 
-def _checked(path: str | Path, part: str) -> str:
+def check_text(path: str | Path, part: str) -> str:
+    """Return a part of a text; refuse what is none."""
     if "\0" in part:
         raise InputError(
             f"{path}: not a text table (it holds zero bytes); is it UTF-16, packed (unpack it) or a binary file?"
         )
     return part
-
-
-def read_filled(path: str | Path, most: int) -> bytes:
-    """Read a file that must exist and hold something, or its first lines."""
-    with unpacked(path) as raw:
-        data = raw.read(most)
-    if not data.strip():
-        raise InputError(f"{path}: the file is empty.")
-    return data if len(data) < most else data[: data.rfind(b"\n") + 1]
-
-
-def decode(path: str | Path, data: bytes, encoding: str) -> str:
-    """Return the text of a file; a byte that the encoding does not know is an error that names its line."""
-    try:
-        text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
-    except UnicodeError:
-        raise _wrong_encoding(path, encoding) from None
-    return _checked(path, text).replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _split_head(path: str | Path, lines: Sequence[str], file: FileMap) -> list[list[str]]:

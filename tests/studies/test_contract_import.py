@@ -13,7 +13,7 @@ import pytest
 from studies.cli import main
 from studies.errors import InputError, MissingEnvironment
 from studies.files import numbers, stored
-from studies.importing import clock, raw
+from studies.importing import clock, look, raw
 from studies.importing.draft import draft_map
 from studies.importing.join import import_records
 from studies.importing.mapping import load_map
@@ -1303,6 +1303,18 @@ def test_a_remark_between_rows_of_a_workbook_is_left_out_as_in_a_text(tmp_path):
         assert any(
             f"1 row without a time left out (first: {tmp_path / name}, line 10)" in one for one in record.comments
         )
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-8", "gb18030"])
+def test_a_long_text_is_drafted_from_its_first_bytes_whatever_letter_they_end_in(tmp_path, monkeypatch, encoding):
+    raw = tmp_path / "raw.csv"
+    rows = [f"{k};{20 + k / 8};好" for k in range(100)]
+    raw.write_text(
+        "\ufeff" * (encoding == "utf-16-le") + "\n".join(["time [s];温度 [°C];备注", *rows]), encoding=encoding
+    )
+    for most in range(600, 610):
+        monkeypatch.setattr(look, "HEAD", most)
+        assert draft_map([str(raw)]).mapped == ("housing_temperature_degC",)
 
 
 def test_a_quote_that_does_not_end_hides_no_rows(tmp_path):
