@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from studies.instrument.units import unit_of
 from studies.resonator.splitting import mean_changes, reference_split
 from studies.simulation.heat_path import SENSOR, behind_housing, build_network, with_sensor
 from studies.simulation.response import lags_of, observed_rows
-from thermal.network import assemble, growing
+from thermal.network import assemble
 from thermal.resonator import describe_resonator
 
 if TYPE_CHECKING:
@@ -39,6 +39,19 @@ FIXED = (
     "thermal.stem_length_mm",
 )
 """Numbers of those tables that have become part of the network."""
+SCALES = {
+    "housing": "thermal.housing_heat_capacity_J_per_K",
+    SENSOR: "thermal.housing_heat_capacity_J_per_K",
+    "base": "thermal.base_heat_capacity_J_per_K",
+    "mass": "thermal.second_mass_J_per_K",
+    "base-mass": "thermal.second_mass_conductance_W_per_K",
+    "chamber-housing": "thermal.chamber_conductance_W_per_K",
+    "housing-base": "thermal.mount_conductance_W_per_K",
+    "radiated housing-base": "thermal.mount_exchange_cm2",
+    "radiated": "thermal.film_emissivity",
+    "conducted": "thermal.conductivity_W_per_m_K",
+    "shell": "thermal.heat_capacity_J_per_kg_K",
+}
 OF_LOOPS = ("gain", "phase_d", "phase_deg", "skew", "misalignment", "split", "axis", "per_Hz", "range", "headroom")
 """Parts of the names of those keys of [loop] that act on settled loops."""
 PRECESSION = "loop.self_precession_deg_per_s"
@@ -101,21 +114,7 @@ class Plan:
     @property
     def key_of(self) -> dict[str, str]:
         """The parameter that scales a capacity, link or radiator, by its name; of shell and stem, by "shell"."""
-        if self.instrument.polynomial is not None:
-            return dict.fromkeys(("radiated", "conducted", "shell"), ONE)
-        return {
-            "housing": "thermal.housing_heat_capacity_J_per_K",
-            SENSOR: "thermal.housing_heat_capacity_J_per_K",
-            "base": "thermal.base_heat_capacity_J_per_K",
-            "mass": "thermal.second_mass_J_per_K",
-            "base-mass": "thermal.second_mass_conductance_W_per_K",
-            "chamber-housing": "thermal.chamber_conductance_W_per_K",
-            "housing-base": "thermal.mount_conductance_W_per_K",
-            "radiated housing-base": "thermal.mount_exchange_cm2",
-            "radiated": "thermal.film_emissivity",
-            "conducted": "thermal.conductivity_W_per_m_K",
-            "shell": "thermal.heat_capacity_J_per_kg_K",
-        }
+        return SCALES if self.instrument.polynomial is None else dict.fromkeys(("radiated", "conducted", "shell"), ONE)
 
 
 def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory: "Theory" = "solid") -> Plan:
@@ -159,22 +158,10 @@ def _curve_of(law: "FrequencyLaw") -> "CubicSpline":
 
 def _shell_and_mount(instrument: "Instrument", parameters: dict[str, float]) -> "Network":
     """Return the heat path of a geometry with unit constants, which its parameters scale."""
-    path = instrument.heat_path
+    path, stated = instrument.heat_path, instrument.thermal
+    ones = {key: 1.0 for name, key in SCALES.items() if "mass" not in name or stated.second_mass_J_per_K}
+    unit = instrument.with_values({**ones, "thermal.drive_power_mW": 1e3}).heat_path
     density = float(instrument.material.value("density", instrument.reference_temperature))
-    unit = replace(
-        path,
-        volumetric_capacity=density,
-        conductivity=1.0,
-        emissivity=1.0,
-        base_capacity=growing(1.0, instrument.thermal.base_capacity_slope_per_K),
-        housing_capacity=1.0,
-        second_mass=1.0 if path.second_mass else 0.0,
-        second_mass_conductance=1.0,
-        mount_conductance=1.0,
-        mount_exchange=1e-4,
-        chamber_conductance=1.0,
-        drive_power=1.0,
-    )
     parameters["thermal.conductivity_W_per_m_K"] = path.conductivity
     capacity = path.volumetric_capacity
     parameters["thermal.heat_capacity_J_per_kg_K"] = math.nan if callable(capacity) else capacity / density
