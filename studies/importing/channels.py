@@ -21,7 +21,7 @@ from studies.files.given import shorten
 from studies.files.reading import ANY_SIZE, digest, opened
 from studies.files.stored import portions
 from studies.importing.channel import Channel, Clock
-from studies.importing.formats import KINDS, READERS
+from studies.importing.formats import READERS
 from studies.importing.mapping import FileMap
 from studies.importing.raw import name_columns, read_text
 from studies.importing.tables import Part, RawTable
@@ -48,7 +48,7 @@ class Group:
 
 def is_container(path: str | Path) -> bool:
     """Tell whether a file is one of channels, by the end of its name."""
-    return Path(path).suffix.lower() in KINDS
+    return Path(path).suffix.lower() in READERS
 
 
 @contextlib.contextmanager
@@ -66,7 +66,7 @@ def plainly(path: str | Path) -> Iterator[None]:
             traceback.clear_frames(one.__traceback__)
             one.__traceback__, one = None, one.__context__
         gc.collect(1)  # what is half-made is young
-        kind = KINDS.get(Path(path).suffix.lower(), "channel")
+        kind = READERS.get(Path(path).suffix.lower(), ("channel", None))[0]
         raise InputError(
             f"{path}: cannot be read as {kind}: damaged, cut off, or of another format ({shorten(said)}); export it again."
         ) from None
@@ -87,7 +87,7 @@ def read_channels(path: str | Path, files: contextlib.ExitStack) -> list[Channel
         if not file.read(1):
             raise InputError(f"{path}: the file is empty.")
     with plainly(path):
-        found = list(READERS[KINDS[Path(path).suffix.lower()]](str(path), files))
+        found = list(READERS[Path(path).suffix.lower()][1](str(path), files))
     if not any(channel.rows > 1 and not channel.refused for channel in found):
         why = next((f" ('{channel.name}' {channel.refused})" for channel in found if channel.refused), "")
         raise InputError(f"{path}: has no channel of two numbers or more{why}; export the channels as plain numbers.")

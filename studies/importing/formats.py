@@ -16,15 +16,6 @@ from studies.files.reading import ANY_SIZE, load_library, opened
 from studies.files.stored import PORTION
 from studies.importing.channel import RATES, STARTS, STEPS, UNITS, Channel, Clock, even_clock, find_unit, stamp_clock
 
-KINDS = {
-    ".tdms": "TDMS",
-    ".mf4": "MDF",
-    ".mdf": "MDF",
-    ".h5": "HDF5",
-    ".hdf5": "HDF5",
-    ".mat": "MATLAB",
-    ".parquet": "Parquet",
-}
 NUMBERS = "iufb"
 MOST_WIDE = 64  # columns of a matrix that are channels
 OBJECT = "holds objects, not numbers, and is not opened: save it as plain numbers"
@@ -241,10 +232,10 @@ def _parquet_values(file: Any, name: str) -> Iterator[Any]:
         yield part.column(0).to_numpy(zero_copy_only=False)
 
 
-READERS: Mapping[str, Callable[[str, ExitStack], Iterator[Channel]]] = {
-    "TDMS": read_tdms,
-    "MDF": read_mdf,
-    "HDF5": read_hdf5,
-    "MATLAB": read_matlab,
-    "Parquet": read_parquet,
+READERS: Mapping[str, tuple[str, Callable[[str, ExitStack], Iterator[Channel]]]] = {
+    ".tdms": ("TDMS", read_tdms),
+    **dict.fromkeys((".mf4", ".mdf"), ("MDF", read_mdf)),
+    **dict.fromkeys((".h5", ".hdf5"), ("HDF5", read_hdf5)),
+    ".mat": ("MATLAB", read_matlab),
+    ".parquet": ("Parquet", read_parquet),
 }
