@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 
 from studies.importing.heading import read_heading
 from studies.importing.look import Look
+from studies.importing.mapping import ColumnMap
 from studies.importing.meaning import Meaning, read_reading, say_qualified
 from studies.importing.notation import Notation, is_number
 from studies.importing.units import split_nominal, units_of
 from studies.importing.words import BRACKETED
 from studies.schema.keys import spell_value
+from studies.schema.reference import list_keys
 
 
 def guess_meanings(hints: Mapping[str, str], numbers: Mapping[str, Sequence[float]]) -> dict[str, Meaning]:
@@ -52,7 +54,7 @@ def draft_column(
     for key in units[unit].settings:
         nominal = next((f for one in re.findall(BRACKETED, hint) if (f := split_nominal(one)[1])), nominal)
         value, said = (nominal, "stated in the file; ") if key == "nominal_Hz" and nominal is not None else (0.0, "")
-        lines.append(f"{key} = {value!r}{check(said + _SETTING_WORDS[key])}")
+        lines.append(f"{key} = {value!r}{check(said + _MEANINGS[key])}")
     if meaning.axis:
         lines.append(f'axis = "{meaning.axis}"')
     return ["[[file.column]]", *lines]
@@ -73,13 +75,8 @@ def draft_unknown(name: str, numbers: Sequence[float], hint: str) -> list[str]:
     ]
 
 
+_MEANINGS = {row["key"]: row["meaning"] for row in list_keys(ColumnMap)}
 SENTINELS = (999.0, 9999.0, 99999.0)  # sizes of readings that loggers write for none
-_SETTING_WORDS = {
-    "clock_Hz": "frequency of the clock that is counted",
-    "periods": "number of periods in which it is counted",
-    "gate_s": "length of the gate in which periods are counted",
-    "nominal_Hz": "frequency from which the reading is counted",
-}
 
 
 def find_markers(look: Look, time: Sequence[str]) -> list[str]:
