@@ -1,6 +1,7 @@
 """The designs of a study: grids, lists, Latin hypercubes, Sobol sequences, Saltelli's and one-at-a-time designs."""
 
 from hashlib import blake2b
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -25,20 +26,6 @@ def hash_designs(designs: Array) -> str:
     return blake2b(designs.astype("<f8").tobytes(), digest_size=16).hexdigest()
 
 
-def count_cases(study: Study) -> int:
-    """Return how many designs a study has, without drawing them."""
-    method, d = study.sampling.method, len(study.parameters)
-    if not d:
-        return 1
-    if method == "grid":
-        return int(np.prod([len(p.values) or p.count or 1 for p in study.parameters], dtype=float))
-    if method == "list":
-        return len(study.parameters[0].values)
-    if method == "one-at-a-time":
-        return 1 + len(LEVELS) * d
-    return study.sampling.cases * (d + 2 if method == "sensitivity" else 1)
-
-
 def coding(study: Study) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Return the names of the parameters, each with its texts, the nominal one last (`studies.sweeps.block.decode`)."""
     return tuple((p.name, (*p.values, p.nominal) if isinstance(p.nominal, str) else ()) for p in study.parameters)
@@ -55,9 +42,9 @@ def nominal_design(study: Study) -> dict[str, Any]:
 
 
 def _grid(study: Study) -> Array:
-    if count_cases(study) > MOST_CASES:
-        raise InputError(f"the grid has {count_cases(study)} cases, above {MOST_CASES}; take fewer or a sample.")
     axes = [_axis(p) if p.values else _spread(p) for p in study.parameters]
+    if (count := prod(map(len, axes))) > MOST_CASES:
+        raise InputError(f"the grid has {count} cases, above {MOST_CASES}; take fewer or a sample.")
     return np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=1)
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from studies.errors import InputError
-from studies.sweeps.design import count_cases, draw, hash_designs
+from studies.sweeps.design import draw, hash_designs
 from studies.sweeps.spec import read_study
 
 
@@ -26,8 +26,8 @@ B = {"name": "user.b", "low": 10.0, "high": 20.0}
 
 
 def test_grid_takes_every_combination():
-    study, found = design("grid", {"name": "user.a", "values": [1, 2, 3]}, {**B, "count": 5})
-    assert found.shape == (15, 2) == (count_cases(study), 2)
+    _, found = design("grid", {"name": "user.a", "values": [1, 2, 3]}, {**B, "count": 5})
+    assert found.shape == (15, 2)
     assert len(np.unique(found, axis=0)) == 15
     assert set(found[:, 1]) == set(np.linspace(10, 20, 5))
 
@@ -77,16 +77,16 @@ def test_samples_follow_their_distribution(keys, law):
 
 
 def test_saltelli_mixes_one_column_at_a_time():
-    study, found = design("sensitivity", A, B, cases=8, seed=1)
-    assert len(found) == 8 * 4 == count_cases(study)
+    _, found = design("sensitivity", A, B, cases=8, seed=1)
+    assert len(found) == 8 * 4
     first, second, mixed_a, mixed_b = found.reshape(4, 8, 2)
     assert np.array_equal(mixed_a, np.column_stack([second[:, 0], first[:, 1]]))
     assert np.array_equal(mixed_b, np.column_stack([first[:, 0], second[:, 1]]))
 
 
 def test_one_at_a_time_moves_one_parameter_through_five_levels():
-    study, found = design("one-at-a-time", A, {**B, "nominal": 12.0})
-    assert len(found) == 9 == count_cases(study)
+    _, found = design("one-at-a-time", A, {**B, "nominal": 12.0})
+    assert len(found) == 9
     assert found[0].tolist() == [0.5, 12.0]
     assert found[5:, 1].tolist() == [10.0, 11.0, 16.0, 20.0]
     assert (found[5:, 0] == 0.5).all()
