@@ -13,6 +13,7 @@ from studies.acceptance.service import measure_life, measure_storage, measure_tr
 from studies.fits.ringdown import Decay
 from studies.record import Record
 
+RATE, APPLIED = "measured_rate_deg_per_s", "rate_deg_per_s"
 FIRST: dict[Test, Callable[[Record], Found]] = {
     # tests that take the first record that serves them
     "scale-factor": measure.measure_scale,
@@ -105,6 +106,8 @@ def judge(
     grown = found["inverse_q_trend_per_year"].sources if "inverse_q_trend_per_year" in found else ()
     for record in left:
         short = f"the output at rest is of {length_of(record):.4g} s, less than an hour"
-        none = short if output in record and "rate_deg_per_s" not in record else "its columns fit none of the tests"
+        none = short if output in record and APPLIED not in record else "its columns fit none of the tests"
+        if RATE in record and not {output, APPLIED} & set(record.columns):
+            none = f"at rest the tests need {output}, 3600 times {RATE}"
         used[record.path] = "growth of 1/Q" if record.path in grown else f"no test: {none}"
     return Acceptance(lines, used, band, allan, noise, noisiest)

@@ -52,7 +52,7 @@ def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "
     """Refuse records whose frequency follows the temperatures only if these are read otherwise, and a bias in °/s or of the opposite sign."""
     law = law or law_of(instrument)
     for record in records:
-        _check_unit(instrument, record)
+        check_unit(instrument, record)
         left = _left(instrument, record, law)
         _check_temperatures(instrument, record, left)
         _check_sign(record, left)
@@ -133,7 +133,7 @@ def _check_sign(record: "Record", as_read: "Left") -> None:
         )
 
 
-def _check_unit(instrument: "Instrument", record: "Record") -> None:
+def check_unit(instrument: "Instrument", record: "Record") -> None:
     """Refuse a bias that scatters 3600 times less than the card states, as one in °/s does."""
     if BIAS not in record or len(record) < ROWS // 10:
         return

@@ -7,9 +7,11 @@ import numpy as np
 from studies.acceptance.judgement import Acceptance, JudgedQuantity, judge
 from studies.acceptance.limits import ELSEWHERE, SCHEMA, Limits
 from studies.acceptance.measure import CONFIDENCE
+from studies.calibration.misreading import check_unit
 from studies.cli.arguments import Card, Records
 from studies.cli.output import answers, say
 from studies.errors import InputError, nearest, numbered
+from studies.fits.misread_decay import doubt_unit
 from studies.fits.ringdown import is_decay, read_decay
 from studies.instrument.card import load_card
 from studies.instrument.units import unit_of
@@ -49,12 +51,16 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     free = [path for path in runs if is_decay(path)]
     held = [read_record(path) for path in runs if path not in free]
     records = records_of_one_gyro(held, lambda doubt: say(f"warning: {doubt}"))
+    for record in records:
+        check_unit(instrument, record)
     if output != OUTPUT and not any(output in record for record in records):
         known = {name for record in records for name in record.columns}
         raise InputError(f"--output {output}: no record has this column{nearest(output, known)}")
     if unit_of(output) != unit_of(OUTPUT):
         raise InputError(f"--output {output}: the zero-rate output is a column in °/h, such as compensated_{OUTPUT}.")
     decays = [read_decay(path) for path in free]
+    for doubt in filter(None, (doubt_unit(decay.path, decay, instrument) for decay in decays)):
+        say(f"warning: {doubt}")
     allowed = None if limits is None else read_file(limits, Limits, SCHEMA)
     found = judge(records, allowed, output, decays)
     lines = [_line(line) for line in found.lines]

@@ -8,6 +8,7 @@ from compensation.arrays import Array
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from compensation.improvement import AVERAGING, FEWEST
+from compensation.noise import white_rms
 from studies import models
 from studies.cli.output import answers, keep_record, say
 from studies.errors import InputError
@@ -15,11 +16,12 @@ from studies.files.writing import write_text
 from studies.instrument.units import unit_of
 from studies.record import COMPENSATED, RESONATOR, Record, read_record
 from studies.record.misread import mend_by, misreadings
+from studies.record.one_gyro import FINER, SHIFTS
 from studies.record.rest import check_record
 from studies.reports import style
 from studies.results import Drawing, Figure, Part, Result, Sentence, Table
 
-RATE, APPLIED = "measured_rate_deg_per_s", "rate_deg_per_s"
+RATE, APPLIED, FREQUENCY = "measured_rate_deg_per_s", "rate_deg_per_s", "frequency_Hz"
 WANTED = 10  # averages of a record that is too short for as many of 100 s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
 WORSE = "{} is worse than the record: the standard deviation of {:.3g} s averages increases from {:.4g} to {:.4g}. Use it only if the model is of this gyro."
@@ -28,6 +30,10 @@ EXPLAINED = 0.5  # of the record's deviation, and of what is left: what a correc
 MISREAD = (
     "{}: {} {}: the correction brings the standard deviation of {:.3g} s averages from {:.4g} to {:.4g}, and to {:.4g} once that is"
     " mended. {}, or leave the record out if it is of another gyro."
+)
+LATE = (
+    "{0}: with {1} read {2:.2g} h {3}, what is left changes by {5:.3g} instead of {4:.3g} (rms, white noise apart): is one of the two logged"
+    " by another clock, or does the output lag?"
 )
 SIGN = "Correct the sign of the column, or of the temperature if the model takes one"
 OWN_THERMOMETER = (
@@ -75,6 +81,7 @@ def compensate(
         added = [name for name in result.columns if name not in record]
         columns = {name: _judge(record, result, name) for name in added if name.startswith(COMPENSATED)}
         worse = _find_worse(record, result, columns)
+        worse += filter(None, (_find_late(record, result, name, next(iter(loaded.validity), "")) for name in columns))
         keep_record(result, out)
         parts = _show(record, result, columns, worse)
         if RESONATOR in added:
@@ -113,9 +120,34 @@ def _find_worse(record: Record, result: Record, columns: dict[str, dict[str, Any
                 mend = SIGN if times < 0 else mend_by(times)
                 raise InputError(MISREAD.format(record.path, output, words, _width(record), was, now, so, mend))
         if now > was * (1 + NOISE):
-            moving = MOVING if output == "frequency_Hz" else ""
+            moving = MOVING if output == FREQUENCY else ""
             found.append(WORSE.format(name, _width(record), was, now) + moving)
     return found
+
+
+def _find_late(record: Record, result: Record, name: str, drive: str) -> str:
+    """Say by how much another clock, or a lag, would explain what a correction leaves; empty where none does."""
+    output, time = name.removeprefix(COMPENSATED), record["time_s"]
+    if output not in record or output == FREQUENCY or (output == RATE and APPLIED in record):
+        return ""
+
+    def compare(by: float) -> tuple[float, float, float]:
+        """Return the squares that the correction of `by` s later and that of now leave in the same rows, white noise apart, and their ratio."""
+        later = np.interp(time + by, time, record[output] - result[name], left=np.nan, right=np.nan)
+        both = record[output] - later, np.where(np.isfinite(later), result[name], np.nan)
+        moved, now = (
+            np.nan if means is None else float(means.var()) - white_rms(means) ** 2
+            for means in (_means(record, values) for values in both)
+        )
+        return moved, now, moved / now if now > 0 and moved == moved else np.inf
+
+    best = min(SHIFTS, key=lambda by: compare(by)[2])
+    best = min((best * times for times in FINER), key=lambda by: compare(by)[2])
+    moved, now, ratio = compare(best)
+    if not ratio < EXPLAINED**2:
+        return ""
+    when = "later" if best > 0 else "earlier"
+    return LATE.format(name, drive, abs(best) / 3600, when, now**0.5, max(moved, 0.0) ** 0.5)
 
 
 def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]], worse: list[str]) -> list[Part]:
@@ -157,10 +189,14 @@ def _width(record: Record) -> float:
 
 def _stability(record: Record, name: str, values: Array) -> float | None:
     """Standard deviation of averages; of a measured rate the error, where the record has the applied one."""
-    if name.endswith(RATE) and APPLIED in record:
-        values = values - record[APPLIED]
+    means = _means(record, values - record[APPLIED] if name.endswith(RATE) and APPLIED in record else values)
+    return None if means is None else float(means.std())
+
+
+def _means(record: Record, values: Array) -> Array | None:
+    """Averages of an output; None where there are too few."""
     try:
         means = average_blocks(record["time_s"], {"output": values}, _width(record)).columns["output"]
     except CompensationError:
         return None
-    return float(means.std()) if means.size >= FEWEST else None
+    return means if means.size >= FEWEST else None

@@ -10,6 +10,7 @@ from compensation.ringdown.laws import Law
 from studies.cli.arguments import COUNT, POSITIVE, Files, Harmonic, open_given
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
+from studies.fits.misread_decay import doubt_unit
 from studies.fits.ringdown import Decay, read_decay, with_decay
 from studies.progress import Told
 from studies.record.decays import Decays, fit_laws, is_table, read_table, table_of, write_decays
@@ -77,6 +78,10 @@ def fit_ringdown(
         for number, path in enumerate(data if not tables else ()):
             told(path, number / len(data))
             decays.append(read_decay(path, frequency=frequency, harmonic=harmonic, expected=expected))
+            if instrument is not None and (doubt := doubt_unit(path, decays[-1], instrument)):
+                if save is not None:
+                    raise InputError(doubt)
+                say(f"warning: {doubt}")
     table = read_table(tables[0]) if tables else table_of(decays)
     laws = fit_laws(table)
     if tables and not laws:

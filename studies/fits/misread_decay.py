@@ -13,6 +13,7 @@ from compensation.ringdown.answer import RingDown
 from compensation.ringdown.envelope import Envelope, even_rows
 from compensation.ringdown.terms import WHITE
 from studies.errors import InputError
+from studies.instrument.card import Instrument
 
 WRAPS, ALIKE, COHERENT = 2, 0.3, 0.9
 """Jumps of a phase; rad by which they are as the other steps once 2π is taken off; and what those leave of the mean turn: noise in degrees leaves none."""
@@ -20,6 +21,9 @@ MIRRORED, APART = 0.5, 0.3
 """Overlap of the lines of two pick-offs, one mirrored about the reference, from which it is doubted where the fit explains them; and most of it that they have as read."""
 BEST, IMPOSSIBLE = 2e8, 1e9
 """Q of annealed fused silica, the highest at room temperature (Ageev et al. 2004), and one that no shell has."""
+FAR = 3.0
+"""Standard deviations of a card's 1/Q from which on another one is doubted where a unit of time explains it."""
+UNITS = {"minutes": 60.0, "hours": 3600.0, "milliseconds": 1e-3}  # s
 
 
 def check_phase(path: object, name: str, amplitude: Array, phase: Array) -> None:
@@ -92,3 +96,17 @@ def doubt_time(path: object, found: RingDown) -> tuple[str, ...]:
     if 0 < loss.high < 1 / IMPOSSIBLE:
         raise InputError(f"{path}: {said}")
     return (said,)
+
+
+def doubt_unit(path: object, found: RingDown, instrument: Instrument) -> str:
+    """Say that a time is in another unit where that alone brings 1/Q to the card's; empty where it is likely as read."""
+    own = found.estimates.get("inverse_q")
+    loss = next((one for one in instrument.uncertain if one.name == "loss.inverse_q"), None)
+    if own is None or loss is None or min(own.value, loss.value) <= 0:
+        return ""
+    away, spread = float(np.log(own.value / loss.value)), loss.sd / loss.value
+    unit = next((name for name, size in UNITS.items() if abs(away - np.log(size)) < spread), None)
+    if unit is None or abs(away) < FAR * spread:
+        return ""
+    times = f"multiply it by {UNITS[unit]:g}" if UNITS[unit] > 1 else f"divide it by {1 / UNITS[unit]:g}"
+    return f"{path}: Q is {1 / own.value:.3g}, the card's {1 / loss.value:.3g}: is time_s in {unit}? Then {times}; if not, give [loss] inverse_q of the card a value, or an sd, that covers it."

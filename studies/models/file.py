@@ -163,6 +163,10 @@ class Model(ModelKeys, frozen=True, kw_only=True):
     def check_range(self, variable: str, values: Array, extrapolate: bool) -> None:
         """Refuse values of a variable outside the fitted range, unless told to extrapolate; NaN pass and stay missing."""
         low, high = self.range_of(variable)
+        if variable == "frequency_Hz" and values.size and low <= 1e3 * np.nanmedian(values) <= high:
+            raise InputError(
+                f"{variable} is near {np.nanmedian(values):.6g}, a thousandth of {low:.6g} to {high:.6g} Hz, which the model was fitted to: is it in kHz? Then multiply the column by 1000."
+            )
         outside = (values < low) | (values > high)
         if not extrapolate and np.any(outside):
             lowest, highest = np.nanmin(values), np.nanmax(values)

@@ -370,3 +370,15 @@ def test_a_run_in_another_unit_is_refused(tmp_path, refuse, factor, unit, count)
     assert f"hrg: {runs[1]}: bias_deg_per_h scatters and changes" in said
     mend = f"Multiply the column by {1 / factor:.6g}" if factor < 1 else f"Divide the column by {factor:.6g}"
     assert f"as in {unit}. {mend}" in said
+
+
+@pytest.mark.parametrize(("by", "said"), [(1800.0, "read 0.5 h later"), (-3600.0, "read 1 h earlier"), (0.0, "")])
+def test_a_frequency_of_another_clock_is_doubted(calibrated, tmp_path, capsys, by, said):
+    run = read_record(calibrated / "run1.csv")
+    late = np.interp(run["time_s"] - by, run["time_s"], run["frequency_Hz"])
+    write_record(run.with_columns({"frequency_Hz": late}), tmp_path / "run.csv")
+    assert (
+        main(["compensate", *map(str, (calibrated / "m.toml", tmp_path / "run.csv", "--out", tmp_path / "o.csv"))]) == 0
+    )
+    told = capsys.readouterr().err
+    assert ("by another clock" in told, said in told) == (bool(by), True)

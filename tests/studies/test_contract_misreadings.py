@@ -27,6 +27,7 @@ from studies.simulation.chamber import load_profile
 from studies.simulation.drive import drive_by_profile, drive_by_record
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import diagnose
+from thermal.lag import lag
 
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC")
 
@@ -618,3 +619,15 @@ def test_a_column_that_is_stuck_to_the_end_is_left_out(four, name):
 def test_the_odd_frequency_of_several_comes_first_and_its_factor_is_told(four, factor, said):
     with pytest.raises(InputError, match=rf"^run2\.csv: frequency_Hz is about .*{said}"):
         said_of(put(four, 2, lambda run: run.with_columns({"frequency_Hz": factor * run["frequency_Hz"]})))
+
+
+def test_a_small_cup_in_a_chamber_for_fast_transfers_is_doubted_and_taken():
+    """18 K/min and a lag of 100 s are what such chambers and cups of metal have; they were refused as minutes."""
+    time = np.arange(0.0, 5000.0, 2.0)
+    housing = lag(
+        time, np.interp(time % 1000.0, [0.0, 350.0, 500.0, 850.0, 1000.0], [-40.0, 65.0, 65.0, -40.0, -40.0]), 30.0
+    )
+    run = Record(
+        {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": 4400.0 - lag(time, housing, 100.0)}
+    )
+    assert "if time_s is in minutes" in check_record(run)

@@ -241,3 +241,16 @@ def test_a_frequency_that_lags_its_thermometer_is_told_as_such(model, tmp_path, 
     said = capsys.readouterr().err
     assert "compensated_frequency_Hz is worse than the record" in said
     assert "the resonator lags its thermometer" in said
+
+
+@pytest.mark.parametrize("more", [[], ["--extrapolate"]])
+def test_a_frequency_in_kilohertz_is_named(tmp_path, refuse, more):
+    time = np.arange(2000.0)
+    f = 4e3 + 2 * np.sin(2 * np.pi * time / 2000)
+    settings = {"variable": "frequency_Hz", "reference_frequency_Hz": 4e3, "rate_window_s": 20.0, "rate_lag_s": 0.0}
+    part = make_part("bias", ("constant", "f"), (0.0, 0.05), ("deg/h", "deg/h/Hz"))
+    ranges = {"frequency_Hz": (3990.0, 4010.0), "frequency_rate_Hz_per_s": (-1.0, 1.0)}
+    model = Model(kind="bias", compensates="bias_deg_per_h", settings=settings, parts=(part,), validity=ranges)
+    words = words_of(tmp_path, model, {"time_s": time, "frequency_Hz": f / 1e3, "bias_deg_per_h": 0.05 * (f - 4e3)})
+    assert "kHz? Then multiply the column by 1000" in refuse([*words, *more])
+    assert not (tmp_path / "out.csv").exists()

@@ -469,3 +469,14 @@ def test_the_angle_kept_without_power(folder, capsys):
     status, _, said = judged(capsys, folder, ("whole",))
     assert status == 2
     assert "needs a gap" in said
+
+
+def test_a_rest_record_in_deg_per_s_is_refused_and_a_rate_alone_is_asked_for_its_bias(folder, tmp_path, refuse, capsys):
+    """It passed limits on N and bias 3600 times too easily."""
+    rest = read_record(folder / "rest0.csv")
+    write_record(rest.with_columns({"bias_deg_per_h": rest["bias_deg_per_h"] / 3600}), tmp_path / "rest.csv")
+    assert "probably in °/s. Multiply it by 3600" in refuse(["acceptance", "hrg-30mm", tmp_path / "rest.csv"])
+    rate = Record({"time_s": rest["time_s"], "measured_rate_deg_per_s": rest["bias_deg_per_h"] / 3600})
+    write_record(rate, tmp_path / "rate.csv")
+    assert main(["acceptance", "hrg-30mm", str(folder / "rest1.csv"), str(tmp_path / "rate.csv")]) == 0
+    assert "bias_deg_per_h, 3600 times measured_rate_deg_per_s" in capsys.readouterr().err

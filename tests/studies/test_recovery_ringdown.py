@@ -328,3 +328,19 @@ def test_contract_a_q_that_no_shell_has_is_a_time_in_milliseconds(tmp_path, refu
         assert any("is time_s in milliseconds?" in one for one in found.remarks)
     else:
         assert not any("milliseconds" in one for one in read_decay(path).remarks)
+
+
+def test_contract_a_decay_in_minutes_is_told_by_the_q_of_its_card(tmp_path, refuse, capsys):
+    """Sixty times too lossy and sixty times split: a card of it was saved (Q 1.7e5 for 1e7)."""
+    gyro = Gyro(4432.075, 4432.025, 0.9e7, 1.1e7, np.radians(31), np.radians(70))
+    z = noisy(gyro.envelope(TIME, 4432.05, [1.0, 0.8j]), 1e-4, np.random.default_rng(1))
+    columns, saved = lock_in_columns(z, False), tmp_path / "card.toml"
+    path = written(tmp_path, columns | {"time_s": TIME / 60.0}, 4432.05)
+    asked = ["fit", "ringdown", path, "--card", "hrg-30mm"]
+    assert "is time_s in minutes? Then multiply it by 60" in refuse([*asked, "--save", saved])
+    assert not saved.exists()
+    assert main([*map(str, asked)]) == 0
+    assert "is time_s in minutes?" in capsys.readouterr().err
+    written(tmp_path, columns, 4432.05)
+    assert main([*map(str, asked)]) == 0
+    assert "minutes" not in capsys.readouterr().err
