@@ -55,7 +55,7 @@ def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "
         check_unit(instrument, record)
         left = _left(instrument, record, law)
         _check_temperatures(instrument, record, left)
-        _check_sign(record, left)
+        _check_sign(instrument, record, left, law)
 
 
 def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Left") -> None:
@@ -117,20 +117,39 @@ def _apart(one: Array, two: Array) -> float:
     return float(np.nanmedian(np.abs(one - two)))
 
 
-def _check_sign(record: "Record", as_read: "Left") -> None:
-    """Refuse a bias that follows what the card predicts with the opposite sign."""
+def _check_sign(instrument: "Instrument", record: "Record", as_read: "Left", law: "FrequencyLaw") -> None:
+    """Refuse a bias that follows what the card predicts with the opposite sign, where the card knows it."""
     if BIAS not in record:
         return
     white = white_rms(record[BIAS][np.isfinite(record[BIAS])])
     changes, left, rest = (
         float(np.sqrt(max(rms**2 - white**2, 0.0))) for rms in (float(np.nanstd(record[BIAS])), *as_read[BIAS])
     )
-    if white < changes and rest < min(FOLLOWED * changes, left / 3):
+    if (
+        white < changes
+        and rest < min(FOLLOWED * changes, left / 3)
+        and not _may_follow(instrument, record, changes, law)
+    ):
         raise InputError(
             f"{record.path}: {BIAS} has the opposite sign to the card's prediction: the prediction leaves {rest:.2g} °/h of its"
             f" {changes:.2g} °/h with the sign changed and {left:.2g} °/h as it is (rms without white noise). Change the sign of the"
             " column or, if the output is right, that of the card's bias."
         )
+
+
+def _may_follow(instrument: "Instrument", record: "Record", changes: float, law: "FrequencyLaw") -> bool:
+    """Whether a bias follows the card's prediction as it is read, with values of the bias that the card holds for likely."""
+    values = [one for one in gather_priors(instrument).values if one.name.startswith("bias.")]
+    places = _places(record)
+    drive = drive_by_record(record, time=record["time_s"][places])
+    found = predict(instrument, drive, [one.name for one in values], law, FARTHEST)
+    rows = [found.columns[BIAS], *(one.sd * found.derivatives[one.name][BIAS] for one in values)]
+    known = np.isfinite(record[BIAS][places])
+    y, *J = (own[known] - own[known].mean() for own in (record[BIAS][places] - rows[0], *rows[1:]))
+    X = np.reshape(J, (len(values), -1)).T
+    unit = FOLLOWED * changes / len(y) ** 0.5
+    z = np.linalg.lstsq(np.vstack([X / unit, np.eye(len(values))]), np.append(y / unit, np.zeros(len(values))))[0]
+    return float(np.std(y - X @ z)) < FOLLOWED * changes and float(z @ z) < LIKELY**2
 
 
 def check_unit(instrument: "Instrument", record: "Record") -> None:

@@ -147,6 +147,8 @@ def test_a_bias_of_the_opposite_sign_is_refused_before_the_fit(card, work):
         work(own, spoilt(made, housing_temperature_degC=lambda T: -T))
     quiet = spoilt(made, bias_deg_per_h=lambda b: np.random.default_rng(1).standard_normal(b.size))
     check_readings(own, [quiet])
+    wide = {"k1_deg_per_h_per_Hz": {"value": 0.2, "sd": 0.3}, "k4_deg_per_h_s_per_Hz": {"value": 300.0, "sd": 450.0}}
+    check_readings(own.with_table("bias", wide), [turned])  # the card does not know the sign either
 
 
 @pytest.mark.slow
