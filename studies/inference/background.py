@@ -115,6 +115,12 @@ class Background:
         along = ways.transpose(0, 2, 1) @ (moment * units[:, :, None])
         return np.maximum(values, 0.0), ways, along
 
+    def weighed(self, name: str) -> list[Array]:
+        """Return Σ⁻¹ times what this model leaves of a response, of each run."""
+        whitener, left = self._whiteners[name], self._solved[1][name]
+        found = {run: K.T @ left[whitener.slices[run]] for K, runs in whitener.roots for run in runs}
+        return [found[run] for run in sorted(found)]
+
     def left_of(self, signals: Mapping[str, Array]) -> tuple[dict[str, Array], Array, Array]:
         """Return what this model cannot absorb of signals, response -> (M, B): whitened rows, their energy (B,), and the coordinates (p, B) that absorb the rest."""
         base, _, _, R = self._solved

@@ -79,6 +79,8 @@ class Shapes:
     """response -> (M, H, k)"""
     count: int
     """Shapes of the whole grid."""
+    weight: float = 1.0
+    """How many of the scanned ones each stands for."""
 
 
 @dataclass(frozen=True)

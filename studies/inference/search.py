@@ -1,6 +1,6 @@
 """Search over effects: the model of all responses grows by the effect that adds most evidence, as long as that pays its price."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -56,10 +56,10 @@ class Search:
 
     def scan(self, now: Hypothesis, bank: Sequence[Shapes] | None = None, less: Sequence[float] = LESS) -> list[Seen]:
         """Return what every effect adds to a model, the strongest first, with its noise and with less slow noise of a response."""
-        bank = self.bank if bank is None else bank
         taken = {term.key for term in now.terms}
-        open_ = [own for own in bank if (own.effect.name, own.response) not in taken]
         plain = Background(self.linear, now.terms, now.noise)
+        bank = [*self.bank, *self._strongest(plain)] if bank is None else bank
+        open_ = [own for own in bank if (own.effect.name, own.response) not in taken]
         found: dict[tuple[str, str], dict[tuple[float, ...], tuple[float, Shapes, int, Mapping[str, Noise]]]] = {}
         for name, noise in [("", now.noise), *self._quieter(now, less)]:
             beside = plain if not name else Background(self.linear, now.terms, noise)
@@ -76,13 +76,25 @@ class Search:
         for shapes in found.values():
             if not shapes:
                 continue
-            gains = np.array([value[0] for value in shapes.values()])
+            gains, weights = np.array([(value[0], value[1].weight) for value in shapes.values()]).T
             top, own, k, noise = max(shapes.values(), key=lambda value: value[0])
             # chosen shapes stand for the whole grid
-            total = float(scipy.special.logsumexp(gains) - np.log(len(gains)))
+            total = float(scipy.special.logsumexp(gains, b=weights) - np.log(weights.sum()))
             term = self.signatures.term(own.effect, own.response, own.shapes[k], PRICE + min(total - top, 0.0))
             out.append(Seen(total, top, term, noise))
         return sorted(out, key=lambda seen: -seen.gain)
+
+    def _strongest(self, beside: Background) -> Iterator[Shapes]:
+        """Yield the strongest shapes of effects whose grids are too fine to be weighed whole: each stands for itself alone."""
+        scanned: dict[tuple[str, str], list[Shapes]] = {}
+        for own in self.bank:
+            scanned.setdefault((own.effect.name, own.response), []).append(own)
+        for (_, name), every in scanned.items():
+            effect, count = every[0].effect, sum(len(own.shapes) for own in every)
+            if effect.strongest is not None and count < every[0].count:
+                times = self.linear.rows[name].times
+                for one in self.signatures.strongest(effect, name, times, beside.weighed(name)):
+                    yield replace(one, weight=count / every[0].count)
 
     def settle(self, terms: tuple[Term, ...], noise: Mapping[str, Noise], names: Sequence[str] = ()) -> Hypothesis:
         """Return the model with noise of its own and the last term at its likeliest scale."""

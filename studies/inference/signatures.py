@@ -147,10 +147,20 @@ class Signatures:
             found += self._shapes(effect, responses)
         return found
 
-    def _shapes(self, effect: Effect, responses: Sequence[str]) -> list[Shapes]:
-        """Return those of one effect, whose columns are the same of these responses."""
+    def strongest(
+        self, effect: Effect, response: str, times: Sequence[Array], weighed: Sequence[Array]
+    ) -> list[Shapes]:
+        """Return the strongest shape of an effect that can tell it from what is left, weighed by its noise; `times` of each run."""
+        if effect.strongest is None:
+            return []
+        return self._shapes(effect, [response], [tuple(effect.strongest(self.span, times, weighed))])
+
+    def _shapes(
+        self, effect: Effect, responses: Sequence[str], alone: Sequence[tuple[float, ...]] = ()
+    ) -> list[Shapes]:
+        """Return those of one effect, whose columns are the same of these responses; of some shapes `alone`, or of all that are scanned."""
         grids = {name: [tuple(shape) for shape in effect.grid(self.span, name)] for name in responses}
-        scanned = {name: dict.fromkeys(chosen(effect, grid)) for name, grid in grids.items()}
+        scanned = {name: dict.fromkeys(alone or chosen(effect, grid)) for name, grid in grids.items()}
         first = {name: leading(effect, len(grid)) for name, grid in grids.items()}
         groups: dict[tuple[str, tuple[int, ...]], list[tuple[tuple[float, ...], Columns]]] = {}
         for shape in dict.fromkeys(shape for shapes in scanned.values() for shape in shapes):

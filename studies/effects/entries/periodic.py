@@ -1,6 +1,11 @@
 """Periodic disturbance: a line at one period, with harmonics."""
 
+from collections.abc import Sequence
+from functools import lru_cache
+
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
@@ -33,6 +38,21 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     return forms + own
 
 
+def strongest(span: Span, times: Sequence[Array], weighed: Sequence[Array]) -> Shape:
+    """The period of which most is left over what its neighbours have, of a grid too fine to be weighed whole."""
+    periods = np.array([period for period, restarts in grid(span, "") if restarts == 1.0])
+    power = sum(np.abs(_turns(periods.tobytes(), t.tobytes()) @ v) ** 2 for t, v in zip(times, weighed, strict=True))
+    best = int(np.argmax(power / scipy.ndimage.median_filter(power, BESIDE, mode="nearest")))
+    return (float(periods[best]), OWN if 1 < span.runs <= MOST_RUNS else 1.0)
+
+
+@lru_cache(maxsize=16)
+def _turns(periods: bytes, times: bytes) -> NDArray[np.complex64]:
+    """A line of each period in rows, which a search asks for again and again."""
+    turns = np.outer(1.0 / np.frombuffer(periods), np.frombuffer(times))
+    return np.exp(2j * np.pi * turns).astype(np.complex64)
+
+
 def near(span: Span, response: str, shape: Shape) -> list[tuple[float, ...]]:
     """Periods that one run hardly tells from this one, spaced finer than the lines that runs days apart tell: a tenth of a turn."""
     middle, reach = 1.0 / shape[0], LOBE / span.longest_run
@@ -49,6 +69,7 @@ CYCLES = 3.0  # periods in the longest run that make a line: with fewer, a wande
 MOST = 1500
 FASTEST = 2.05  # steps of the grid to a period: one of two steps or fewer is folded back to a slower one
 LOBE = 0.6  # turns over a run by which two periods may differ and still look alike in it
+BESIDE = 41  # periods whose median tells what noise has at the middle one
 OWN, MOST_RUNS = 2.0, 12
 HARMONICS = (1.0, 0.3, 0.1)
 
@@ -68,6 +89,7 @@ EFFECT = Effect(
     columns=columns,
     grid=grid,
     near=near,
+    strongest=strongest,
     sizes={"bias_deg_per_h": 10.0, "frequency_Hz": 5e-5, "inverse_q": 0.3},
     alike=True,
     shape=(
