@@ -50,7 +50,7 @@ def strongest(span: Span, times: Sequence[Array], weighed: Sequence[Array]) -> S
 def _turns(periods: bytes, times: bytes) -> NDArray[np.complex64]:
     """A line of each period in rows, which a search asks for again and again."""
     turns = np.outer(1.0 / np.frombuffer(periods), np.frombuffer(times))
-    return np.exp(2j * np.pi * turns).astype(np.complex64)
+    return np.asarray(np.exp(2j * np.pi * turns), dtype=np.complex64)
 
 
 def near(span: Span, response: str, shape: Shape) -> list[tuple[float, ...]]:

@@ -1,11 +1,14 @@
 """A line faster than the steps of the grid: resolved where a finer grid does, else said to be there; never taken for noise."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from compensation.noise import Noise
 from studies.inference.diagnosis import blocks_of
+from studies.inference.hypothesis import Hypothesis
 from studies.record import Record
 from studies.workbench import diagnose_records
 
@@ -80,3 +83,17 @@ def test_a_shorter_stretch_resolves_it():
     assert (verdict.verdict, cause.effect) == ("explained", "periodic")
     assert cause.parameters["period_s"].value == pytest.approx(17.0, abs=1e-3)
     assert amplitude(cause) == pytest.approx(3.0 * NOISE, rel=0.03)
+
+
+def test_a_line_between_the_scanned_periods_stands_out_of_noise_that_has_taken_it_in(fine):
+    """Of a grid too long to be weighed every fifth period is; between two of them a line of a dozen turns was correlated noise."""
+    search, name = diagnose_records(a_campaign(60.0, size=0.0)).search, "frequency_Hz"
+    rows, noise = search.linear.rows[name], Noise(NOISE * SAMPLING**0.5, markov=2.0 * NOISE, markov_time=600.0)
+    time, length = np.concatenate(rows.times), ROWS * SAMPLING
+    for turns in (9.0, 10.3, 11.2, 12.4, 13.1):
+        line = 3.0 * NOISE * np.sin(2.0 * np.pi * turns * time / length)
+        there = copy(search)
+        there.linear = replace(search.linear, target={name: search.linear.target[name] + line})
+        first = there.scan(Hypothesis((), {name: noise}, 0.0), less=())[0]
+        assert first.term.effect.name == "periodic"
+        assert length / first.term.shape[0] == pytest.approx(turns, abs=0.25)
