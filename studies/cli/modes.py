@@ -20,9 +20,9 @@ from studies.cli.arguments import COUNT, FRACTION, MANY, WHOLE, AnyTheory, Card,
 from studies.cli.output import answers
 from studies.errors import naming
 from studies.instrument.card import Instrument
-from studies.instrument.material_values import known_material
 from studies.reports.digits import to_numerical_error
 from studies.reports.scenes import THEORIES, live_chapter, show_mode, view_blocks
+from studies.resonator.law import known_material
 from studies.results import Column, Result, Sentence, Table, Where, row_of
 
 if TYPE_CHECKING:

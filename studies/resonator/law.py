@@ -1,5 +1,6 @@
 """The frequency law of an instrument: what a simulation, a diagnosis, a study and a page take f(T) from."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, cast
@@ -11,13 +12,15 @@ from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from studies.errors import InputError, naming
 from studies.instrument.card import load_card
-from studies.instrument.material_values import known_material
+from studies.instrument.material_values import LAW, scaled_by
+from studies.instrument.tables.material import GIVEN
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from shell.layout import Theory
-    from shell.material import Mount
+    from shell.material import Material, Mount
     from studies.instrument.card import Card, Instrument
+    from studies.instrument.uncertain import UncertainValue
 
 BEYOND = 1.0  # K by which a run may leave the records
 SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "shear_modulus": "log_slope_per_K", "expansion": "value"}
@@ -34,6 +37,39 @@ def law_of(
 
     T0, mount = instrument.reference_temperature, mount_of(instrument, theory, harmonic)
     return build_law(instrument.resonator, known_material(instrument), T0, lowest, highest, theory, harmonic, mount)
+
+
+def known_material(instrument: "Instrument") -> "Material":
+    """Return the material with what card and table leave open of its law: values that the card gives, and deviations, with the uncertainty that it states."""
+    from shell.material import Prior
+
+    material = instrument.material
+    values = [one for one in instrument.uncertain if one.name.startswith("material.")]
+    ways = [_moved_by(material, one) for one in values]
+    names = tuple(dict.fromkeys(name for way in ways for name in way))
+    W = np.array([[way.get(name, 0.0) * one.sd for way, one in zip(ways, values, strict=True)] for name in names])
+    R, place = np.eye(len(values)), {one.name: k for k, one in enumerate(values)}
+    for (one, other), correlation in instrument.correlation.items():
+        if one in place and other in place:
+            R[place[one], place[other]] = R[place[other], place[one]] = correlation
+    covariance = W.reshape(len(names), len(values)) @ R @ W.T.reshape(len(values), len(names))
+    sd = np.sqrt(np.diag(covariance))
+    return replace(material, known=Prior(names, sd, covariance / np.outer(sd, sd)))
+
+
+def _moved_by(material: "Material", value: "UncertainValue") -> Mapping[str, float]:
+    """Return which coefficients of the law's deviation a value of the card moves, and by how much of it."""
+    if value.name.startswith(LAW):
+        return {value.name.removeprefix(LAW): 1.0}
+    key = value.name.removeprefix("material.")
+    if key not in GIVEN:
+        return {}  # of a crystal, whose mean over all directions the law is
+    if key == "poisson_ratio":
+        by_shear = (
+            {"shear_modulus.log_value": -1.0 / (1.0 + value.value)} if "shear_modulus" in material.properties else {}
+        )
+        return {"poisson_ratio.value": 1.0, **by_shear}
+    return {f"{scaled_by(material, GIVEN[key][0])}.log_value": 1.0 / value.value}
 
 
 def mount_of(instrument: "Instrument", theory: "Theory", harmonic: int) -> "Mount | None":
