@@ -106,9 +106,7 @@ def _needed(instrument: "Instrument", record: "Record", changes: float, law: "Fr
         J = np.column_stack([slopes, starts])[known] / (FOLLOWED * changes)
         rest = (record[FREQUENCY][places] - found.columns[FREQUENCY] + slopes @ u)[known] / (FOLLOWED * changes)
         J, rest = J - J.mean(axis=0), rest - rest.mean()
-        z = np.linalg.lstsq(
-            np.vstack([J * len(J) ** 0.5, np.eye(J.shape[1])]), np.append(rest * len(J) ** 0.5, np.zeros(J.shape[1]))
-        )[0]
+        z = _departures(J, rest)
         u = priors.inside(np.clip(z[: len(u)], -LIKELY, LIKELY))
     return float(z @ z) if np.std(rest - J @ z) < 1.0 else np.inf
 
@@ -145,11 +143,18 @@ def _may_follow(instrument: "Instrument", record: "Record", changes: float, law:
     found = predict(instrument, drive, [one.name for one in values], law, FARTHEST)
     rows = [found.columns[BIAS], *(one.sd * found.derivatives[one.name][BIAS] for one in values)]
     known = np.isfinite(record[BIAS][places])
-    y, *J = (own[known] - own[known].mean() for own in (record[BIAS][places] - rows[0], *rows[1:]))
+    told = np.array([record[BIAS][places] - rows[0], *rows[1:]])[:, known] / (FOLLOWED * changes)
+    rest, *J = told - told.mean(axis=1, keepdims=True)
     X = np.reshape(J, (len(values), -1)).T
-    unit = FOLLOWED * changes / len(y) ** 0.5
-    z = np.linalg.lstsq(np.vstack([X / unit, np.eye(len(values))]), np.append(y / unit, np.zeros(len(values))))[0]
-    return float(np.std(y - X @ z)) < FOLLOWED * changes and float(z @ z) < LIKELY**2
+    z = _departures(X, rest)
+    return float(np.std(rest - X @ z)) < 1.0 and float(z @ z) < LIKELY**2
+
+
+def _departures(J: Array, rest: Array) -> Array:
+    """Departures in standard deviations with which columns most probably explain a rest, both in units of what may be left."""
+    heavy, count = len(J) ** 0.5, J.shape[1]
+    X, y = np.vstack([J * heavy, np.eye(count)]), np.append(rest * heavy, np.zeros(count))
+    return np.asarray(np.linalg.lstsq(X, y)[0])
 
 
 def check_unit(instrument: "Instrument", record: "Record") -> None:

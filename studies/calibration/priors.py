@@ -120,13 +120,9 @@ def to_standard(value: "UncertainValue", number: float) -> float:
 
 def gather_priors(instrument: "Instrument", exact: Sequence[str] = ()) -> Priors:
     """Return the priors of an instrument's uncertain values but for those that are to be taken as exact."""
-    correlation = instrument.correlation
     idle = idle_values(instrument)
     values = tuple(value for value in instrument.uncertain if value.name not in exact and value.name not in idle)
-    R = np.eye(len(values))
-    for i, one in enumerate(values):
-        for j, other in enumerate(values[:i]):
-            R[i, j] = R[j, i] = correlation.get((one.name, other.name), correlation.get((other.name, one.name), 0.0))
+    R = instrument.correlation_of(values)
     known = {value.name: value for value in values}
     told: tuple[float, float] | None = instrument.part("posterior").anisotropy_sd
     wave = (

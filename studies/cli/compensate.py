@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from compensation.arrays import Array
-from compensation.decimation import average_blocks
+from compensation.decimation import Blocks, average_blocks
 from compensation.errors import CompensationError
 from compensation.improvement import AVERAGING, FEWEST
 from compensation.noise import white_rms
@@ -127,27 +127,28 @@ def _find_worse(record: Record, result: Record, columns: dict[str, dict[str, Any
 
 def _find_late(record: Record, result: Record, name: str, drive: str) -> str:
     """Say by how much another clock, or a lag, would explain what a correction leaves; empty where none does."""
-    output, time = name.removeprefix(COMPENSATED), record["time_s"]
+    output = name.removeprefix(COMPENSATED)
     if output not in record or output == FREQUENCY or (output == RATE and APPLIED in record):
         return ""
-
-    def compare(by: float) -> tuple[float, float, float]:
-        """Return the squares that the correction of `by` s later and that of now leave in the same rows, white noise apart, and their ratio."""
-        later = np.interp(time + by, time, record[output] - result[name], left=np.nan, right=np.nan)
-        both = record[output] - later, np.where(np.isfinite(later), result[name], np.nan)
-        moved, now = (
-            np.nan if means is None else float(means.var()) - white_rms(means) ** 2
-            for means in (_means(record, values) for values in both)
-        )
-        return moved, now, moved / now if now > 0 and moved == moved else np.inf
-
-    best = min(SHIFTS, key=lambda by: compare(by)[2])
-    best = min((best * times for times in FINER), key=lambda by: compare(by)[2])
-    moved, now, ratio = compare(best)
-    if not ratio < EXPLAINED**2:
+    means = _means(record, output=record[output], correction=record[output] - result[name])
+    if means is None:
         return ""
-    when = "later" if best > 0 else "earlier"
-    return LATE.format(name, drive, abs(best) / 3600, when, now**0.5, max(moved, 0.0) ** 0.5)
+    time, (y, correction) = means.time, means.columns.values()
+
+    def compare(by: float) -> tuple[float, float, float, float]:
+        """Return which part of the squares the correction of `by` s later leaves of those of now, `by`, and both, white noise apart."""
+        later = np.interp(time + by, time, correction, left=np.nan, right=np.nan)
+        both = np.isfinite(later)
+        if np.count_nonzero(both) < FEWEST:
+            return np.inf, by, 0.0, 0.0
+        moved, now = (float(left.var()) - white_rms(left) ** 2 for left in ((y - later)[both], (y - correction)[both]))
+        return moved / now if now > 0 else np.inf, by, moved, now
+
+    _, near, *_ = min(map(compare, SHIFTS))
+    part, by, moved, now = min(compare(near * times) for times in FINER)
+    if part >= EXPLAINED**2:
+        return ""
+    return LATE.format(name, drive, abs(by) / 3600, "later" if by > 0 else "earlier", now**0.5, max(moved, 0.0) ** 0.5)
 
 
 def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]], worse: list[str]) -> list[Part]:
@@ -189,14 +190,14 @@ def _width(record: Record) -> float:
 
 def _stability(record: Record, name: str, values: Array) -> float | None:
     """Standard deviation of averages; of a measured rate the error, where the record has the applied one."""
-    means = _means(record, values - record[APPLIED] if name.endswith(RATE) and APPLIED in record else values)
-    return None if means is None else float(means.std())
+    means = _means(record, output=values - record[APPLIED] if name.endswith(RATE) and APPLIED in record else values)
+    return None if means is None else float(means.columns["output"].std())
 
 
-def _means(record: Record, values: Array) -> Array | None:
-    """Averages of an output; None where there are too few."""
+def _means(record: Record, **columns: Array) -> Blocks | None:
+    """Averages of columns; None where there are too few."""
     try:
-        means = average_blocks(record["time_s"], {"output": values}, _width(record)).columns["output"]
+        means = average_blocks(record["time_s"], columns, _width(record))
     except CompensationError:
         return None
-    return means if means.size >= FEWEST else None
+    return means if means.time.size >= FEWEST else None

@@ -130,7 +130,7 @@ class Effect:
     near: Callable[[Span, str, Shape], Sequence[tuple[float, ...]]] | None = None
     # callable (span, times of runs, what is left weighed by its noise) -> shape: The strongest of such a grid, found
     # without weighing each.
-    strongest: Callable[[Span, Sequence[Array], Sequence[Array]], Shape] | None = None
+    strongest: Callable[[Span, Sequence[Array], Sequence[Array]], tuple[float, ...]] | None = None
     # callable (temperature - reference, shape) -> (N, k) array: What is left of it in a steady state, for tables, with
     # `steady_grid` (low, high) -> shapes, both in K.
     steady: Callable[[Array, Shape], Array] | None = None

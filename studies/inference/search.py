@@ -92,9 +92,10 @@ class Search:
         for (_, name), every in scanned.items():
             effect, count = every[0].effect, sum(len(own.shapes) for own in every)
             if effect.strongest is not None and count < every[0].count:
-                times = self.linear.rows[name].times
-                for one in self.signatures.strongest(effect, name, times, beside.weighed(name)):
-                    yield replace(one, weight=count / every[0].count)
+                rows = self.linear.rows[name].times
+                shape = effect.strongest(self.signatures.span, rows, beside.weighed(name))
+                for one in self.signatures.shapes(effect, [name], [shape]):
+                    yield replace(one, weight=count / one.count)
 
     def settle(self, terms: tuple[Term, ...], noise: Mapping[str, Noise], names: Sequence[str] = ()) -> Hypothesis:
         """Return the model with noise of its own and the last term at its likeliest scale."""

@@ -144,20 +144,10 @@ class Signatures:
         found = []
         for _, pairs in groupby(effects, lambda one: id(one[0]) if one[0].alike else one):
             (effect, *_), responses = zip(*pairs, strict=True)
-            found += self._shapes(effect, responses)
+            found += self.shapes(effect, responses)
         return found
 
-    def strongest(
-        self, effect: Effect, response: str, times: Sequence[Array], weighed: Sequence[Array]
-    ) -> list[Shapes]:
-        """Return the strongest shape of an effect that can tell it from what is left, weighed by its noise; `times` of each run."""
-        if effect.strongest is None:
-            return []
-        return self._shapes(effect, [response], [tuple(effect.strongest(self.span, times, weighed))])
-
-    def _shapes(
-        self, effect: Effect, responses: Sequence[str], alone: Sequence[tuple[float, ...]] = ()
-    ) -> list[Shapes]:
+    def shapes(self, effect: Effect, responses: Sequence[str], alone: Sequence[tuple[float, ...]] = ()) -> list[Shapes]:
         """Return those of one effect, whose columns are the same of these responses; of some shapes `alone`, or of all that are scanned."""
         grids = {name: [tuple(shape) for shape in effect.grid(self.span, name)] for name in responses}
         scanned = {name: dict.fromkeys(alone or chosen(effect, grid)) for name, grid in grids.items()}

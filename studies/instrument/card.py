@@ -1,13 +1,16 @@
 """Cards: the description of one instrument, `schema = "hrg.card/1"`, parsed whole when loaded; `studies.instrument.tables` has the tables."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeAlias, TypeVar, cast
 
+import numpy as np
+
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
@@ -128,6 +131,14 @@ class Instrument:
             return self.part("posterior").pairs  # type: ignore[no-any-return]
         by_law = correlations_of_law(self.material, {one.name for one in self.uncertain} - self.stated)
         return {**by_law, **self.part("posterior").pairs}
+
+    def correlation_of(self, values: Sequence[UncertainValue]) -> Array:
+        """Correlation matrix of some of its uncertain values, in their order."""
+        R, place = np.eye(len(values)), {one.name: k for k, one in enumerate(values)}
+        for (one, other), correlation in self.correlation.items():
+            if one in place and other in place:
+                R[place[one], place[other]] = R[place[other], place[one]] = correlation
+        return R
 
     @property
     def stated(self) -> frozenset[str]:

@@ -28,10 +28,8 @@ AT_ONCE, LEAST_CHANGE, FASTER = 4, 5.0, 2.0  # rows in one direction, K and K/s,
 DOUBTFUL, FAST, FASTER_THAN_ANY, SLOWEST = 0.1, 0.15, 0.5, 1e-4
 """K/s held for a tenth of a record: 6, 9 and 30 K/min, 0.36 K/h. Chambers for fast transfers reach 20 K/min."""
 LEAST_SPREAD, LONG = 10.0, 1e6  # K that a record covers, and s it lasts, before a slow one is doubted
-SHORT_LAG, LONG_LAG = (
-    200.0,
-    2e5,
-)  # s: between them lie resonators behind their housing, in vacuum; a small cup of metal is faster
+SHORT_LAG, LONG_LAG = 200.0, 2e5
+"""s: between them lie resonators behind their housing, in vacuum; a small cup of metal is faster."""
 BRIEF = 1200.0  # s: a run of 20 h, if they are minutes
 CLEAR, APART = 0.5, 30.0  # of what lags so many times shorter leave of a frequency: left by a lag that is there
 LARGEST_REST = 0.01  # applied rate in °/s that still counts as rest: somewhat more than the earth's, 0.0042 °/s

@@ -47,12 +47,9 @@ def known_material(instrument: "Instrument") -> "Material":
     values = [one for one in instrument.uncertain if one.name.startswith("material.")]
     ways = [_moved_by(material, one) for one in values]
     names = tuple(dict.fromkeys(name for way in ways for name in way))
-    W = np.array([[way.get(name, 0.0) * one.sd for way, one in zip(ways, values, strict=True)] for name in names])
-    R, place = np.eye(len(values)), {one.name: k for k, one in enumerate(values)}
-    for (one, other), correlation in instrument.correlation.items():
-        if one in place and other in place:
-            R[place[one], place[other]] = R[place[other], place[one]] = correlation
-    covariance = W.reshape(len(names), len(values)) @ R @ W.T.reshape(len(values), len(names))
+    moves = [way.get(name, 0.0) * one.sd for name in names for way, one in zip(ways, values, strict=True)]
+    W = np.reshape(moves, (len(names), len(values)))
+    covariance = W @ instrument.correlation_of(values) @ W.T
     sd = np.sqrt(np.diag(covariance))
     return replace(material, known=Prior(names, sd, covariance / np.outer(sd, sd)))
 
@@ -65,10 +62,8 @@ def _moved_by(material: "Material", value: "UncertainValue") -> Mapping[str, flo
     if key not in GIVEN:
         return {}  # of a crystal, whose mean over all directions the law is
     if key == "poisson_ratio":
-        by_shear = (
-            {"shear_modulus.log_value": -1.0 / (1.0 + value.value)} if "shear_modulus" in material.properties else {}
-        )
-        return {"poisson_ratio.value": 1.0, **by_shear}
+        held = {"shear_modulus.log_value": -1.0 / (1.0 + value.value)}  # at the same E
+        return {"poisson_ratio.value": 1.0} | (held if "shear_modulus" in material.properties else {})
     return {f"{scaled_by(material, GIVEN[key][0])}.log_value": 1.0 / value.value}
 
 

@@ -38,11 +38,12 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     return forms + own
 
 
-def strongest(span: Span, times: Sequence[Array], weighed: Sequence[Array]) -> Shape:
+def strongest(span: Span, times: Sequence[Array], weighed: Sequence[Array]) -> tuple[float, ...]:
     """The period of which most is left over what its neighbours have, of a grid too fine to be weighed whole."""
     periods = np.array([period for period, restarts in grid(span, "") if restarts == 1.0])
     power = sum(np.abs(_turns(periods.tobytes(), t.tobytes()) @ v) ** 2 for t, v in zip(times, weighed, strict=True))
-    best = int(np.argmax(power / scipy.ndimage.median_filter(power, BESIDE, mode="nearest")))
+    usual = scipy.ndimage.median_filter(power, BESIDE, mode="nearest")
+    best = int(np.argmax(power / np.maximum(usual, np.finfo(float).tiny)))
     return (float(periods[best]), OWN if 1 < span.runs <= MOST_RUNS else 1.0)
 
 
